@@ -1,0 +1,30 @@
+#pragma once
+
+#include <absl/time/clock.h>
+#include <absl/time/time.h>
+
+namespace meshwright {
+
+// Source of the time. Nothing else reads the clock, so that tests can set it.
+class Clock {
+ public:
+  virtual ~Clock() = default;
+  virtual absl::Time Now() const = 0;
+};
+
+class RealClock : public Clock {
+ public:
+  absl::Time Now() const override { return absl::Now(); }
+};
+
+// A clock that stands still until it is told to advance. For tests; not thread-safe.
+class ManualClock : public Clock {
+ public:
+  absl::Time Now() const override { return now_; }
+  void Advance(absl::Duration duration) { now_ += duration; }
+
+ private:
+  absl::Time now_ = absl::FromUnixSeconds(1'000'000'000);
+};
+
+}  // namespace meshwright

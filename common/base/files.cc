@@ -1,0 +1,153 @@
+#include "common/base/files.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+
+#include "common/base/status_macros.h"
+
+namespace meshwright {
+namespace {
+
+constexpr size_t kBufferBytes = size_t{1} << 20;
+
+absl::Status SystemError(const std::string& what, const std::string& path, int error) {
+  const std::string message = absl::StrCat(path, ": ", what, ": ", std::strerror(error));
+  switch (error) {
+    case ENOENT:
+      return absl::NotFoundError(message);
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return absl::PermissionDeniedError(message);
+    case ENOSPC:
+    case EDQUOT:
+      return absl::ResourceExhaustedError(message);
+    default:
+      return absl::InternalError(message);
+  }
+}
+
+absl::Status WriteAll(int descriptor, const uint8_t* data, size_t size, const std::string& path) {
+  while (size > 0) {
+    const ssize_t written = ::write(descriptor, data, size);
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return SystemError("cannot write", path, errno);
+    }
+    data += written;
+    size -= static_cast<size_t>(written);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> ReadFile(const std::string& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return SystemError("cannot open", path, errno);
+  std::string bytes;
+  struct stat info {};
+  if (::fstat(descriptor, &info) == 0 && S_ISREG(info.st_mode)) bytes.reserve(static_cast<size_t>(info.st_size));
+  char buffer[1 << 16];
+  while (true) {
+    const ssize_t count = ::read(descriptor, buffer, sizeof(buffer));
+    if (count == 0) break;
+    if (count < 0) {
+      if (errno == EINTR) continue;
+      const int error = errno;
+      ::close(descriptor);
+      return SystemError("cannot read", path, error);
+    }
+    bytes.append(buffer, static_cast<size_t>(count));
+  }
+  ::close(descriptor);
+  return bytes;
+}
+
+AtomicFile::AtomicFile(std::string path, std::string temporary_path, int descriptor)
+    : path_(std::move(path)), temporary_path_(std::move(temporary_path)), descriptor_(descriptor) {}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      temporary_path_(std::move(other.temporary_path_)),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      buffer_(std::move(other.buffer_)) {}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ < 0) return;
+  ::close(descriptor_);
+  ::unlink(temporary_path_.c_str());
+}
+
+absl::StatusOr<AtomicFile> AtomicFile::Create(const std::string& path) {
+  static std::atomic<int> counter{0};
+  const std::string temporary = absl::StrCat(path, ".partial-", ::getpid(), "-", counter.fetch_add(1));
+  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (descriptor < 0) return SystemError("cannot create", path, errno);
+  return AtomicFile(path, temporary, descriptor);
+}
+
+absl::Status AtomicFile::Append(absl::Span<const uint8_t> bytes) {
+  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  return buffer_.size() >= kBufferBytes ? Flush() : absl::OkStatus();
+}
+
+absl::Status AtomicFile::Append(const std::string& bytes) {
+  return Append(absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()));
+}
+
+absl::Status AtomicFile::Flush() {
+  absl::Status status = WriteAll(descriptor_, buffer_.data(), buffer_.size(), path_);
+  buffer_.clear();
+  return status;
+}
+
+absl::Status AtomicFile::WriteAt(int64_t offset, const std::string& bytes) {
+  MW_RETURN_IF_ERROR(Flush());
+  if (::lseek(descriptor_, offset, SEEK_SET) < 0) return SystemError("cannot seek", path_, errno);
+  MW_RETURN_IF_ERROR(WriteAll(descriptor_, reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size(), path_));
+  if (::lseek(descriptor_, 0, SEEK_END) < 0) return SystemError("cannot seek", path_, errno);
+  return absl::OkStatus();
+}
+
+absl::Status AtomicFile::Commit() {
+  MW_RETURN_IF_ERROR(Flush());
+  if (::fsync(descriptor_) != 0) return SystemError("cannot sync", path_, errno);
+  const int close_result = ::close(std::exchange(descriptor_, -1));
+  if (close_result != 0 || ::rename(temporary_path_.c_str(), path_.c_str()) != 0) {
+    const int error = errno;
+    ::unlink(temporary_path_.c_str());
+    return SystemError("cannot rename into place", path_, error);
+  }
+  // The rename itself must survive a power cut: sync the folder. Not every filesystem can; that is no error.
+  const std::string parent = std::filesystem::path(path_).parent_path().string();
+  const int folder = ::open(parent.empty() ? "." : parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder >= 0) {
+    ::fsync(folder);
+    ::close(folder);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status WriteFileAtomically(const std::string& path, absl::Span<const uint8_t> bytes) {
+  MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
+  MW_RETURN_IF_ERROR(file.Append(bytes));
+  return file.Commit();
+}
+
+absl::Status WriteFileAtomically(const std::string& path, const std::string& bytes) {
+  return WriteFileAtomically(path,
+                             absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()));
+}
+
+}  // namespace meshwright

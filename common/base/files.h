@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <absl/types/span.h>
+
+namespace meshwright {
+
+// Errors name the path and the system's reason. NotFound when there is no such file.
+absl::StatusOr<std::string> ReadFile(const std::string& path);
+
+// A file that appears whole or not at all: written beside its final name, synced, then renamed. Destroying it without
+// Commit() removes what was written.
+class AtomicFile {
+ public:
+  static absl::StatusOr<AtomicFile> Create(const std::string& path);
+  AtomicFile(AtomicFile&& other) noexcept;
+  AtomicFile& operator=(AtomicFile&& other) = delete;
+  AtomicFile(const AtomicFile&) = delete;
+  ~AtomicFile();
+
+  absl::Status Append(absl::Span<const uint8_t> bytes);
+  absl::Status Append(const std::string& bytes);
+  // Overwrites bytes that were already appended (a header whose counts are known only at the end).
+  absl::Status WriteAt(int64_t offset, const std::string& bytes);
+  absl::Status Commit();
+
+ private:
+  AtomicFile(std::string path, std::string temporary_path, int descriptor);
+  absl::Status Flush();
+  std::string path_;
+  std::string temporary_path_;
+  int descriptor_ = -1;
+  std::vector<uint8_t> buffer_;
+};
+
+absl::Status WriteFileAtomically(const std::string& path, const std::string& bytes);
+absl::Status WriteFileAtomically(const std::string& path, absl::Span<const uint8_t> bytes);
+
+}  // namespace meshwright

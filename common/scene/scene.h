@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "common/base/ids.h"
+#include "common/geometry/lens.h"
+#include "common/geometry/rigid3.h"
+
+namespace meshwright {
+
+// One photograph with its camera as the file describes it: the lens may distort, the picture is not decoded.
+struct SceneView {
+  std::string name;        // as the scene's file calls the image; unique
+  std::string image_path;  // where the picture is
+  Lens lens;               // intrinsics and distortion at the size of the picture
+  Rigid3 cam_from_world;
+};
+
+// A point of the sparse reconstruction (structure from motion) with the cameras that saw it.
+struct SparsePoint {
+  Eigen::Vector3d x_in_world = Eigen::Vector3d::Zero();
+  std::array<uint8_t, 3> rgb = {0, 0, 0};
+  std::vector<CameraIndex> seen_by;  // sorted, unique
+};
+
+// What goes in: photographs with known cameras, and sparse points when structure from motion left some. Views are
+// sorted by name, points by (seen_by, x), so that a scene does not depend on the order in its files.
+struct Scene {
+  std::string format;  // "colmap-text", "colmap-binary", "middlebury", "strecha"
+  std::vector<SceneView> views;
+  std::vector<SparsePoint> points;
+};
+
+}  // namespace meshwright
