@@ -5,7 +5,7 @@ target_compile_options(mw_compile_options INTERFACE
   -Wall -Wextra -Wno-unused-parameter -Wno-missing-field-initializers
   # A mixed cluster must compute the same floats: no contraction that depends on the target, no fast math.
   -ffp-contract=off)
-target_include_directories(mw_compile_options INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
+target_include_directories(mw_compile_options INTERFACE ${CMAKE_SOURCE_DIR})
 
 option(MW_WARNINGS_AS_ERRORS "Treat compiler warnings as errors" OFF)
 if(MW_WARNINGS_AS_ERRORS)
