@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "common/geometry/camera.h"
+#include "common/image/sampling_image.h"
+
+namespace meshwright {
+
+// A patch's plane as the reference camera's pixels see it: inverse depth is an affine function of the pixel for any
+// plane, 1/z(x, y) = w + gx * (x - x0) + gy * (y - y0), so extrapolating it to a neighbouring ray is exact.
+struct PatchPlane {
+  float w = 0;   // inverse depth at the patch's own pixel (x0, y0), 1 / scene units
+  float gx = 0;  // its slope per pixel in x
+  float gy = 0;  // and in y
+
+  PatchPlane MovedBy(float dx_px, float dy_px) const { return {w + gx * dx_px + gy * dy_px, gx, gy}; }
+};
+
+// Plane through x_in_cam with this normal (reference camera's frame), at the pixel (x0, y0) where x_in_cam projects.
+PatchPlane PlaneFromNormal(const Camera& reference, double x0, double y0, double depth,
+                           const Eigen::Vector3d& normal_in_cam);
+// Unit normal towards the camera, in the reference camera's frame.
+Eigen::Vector3d NormalInCam(const Camera& reference, double x0, double y0, const PatchPlane& plane);
+
+struct ScoredView {
+  Camera camera;
+  std::shared_ptr<const SamplingImage> grey;
+};
+
+// Photo-consistency of patches of one reference view (section 3.6, Jancosek et al. 2009): normalised cross-correlation
+// (NCC) between a window of the reference and its image through the patch's plane in a target. Thread-safe.
+class PatchScorer {
+ public:
+  // What Score() returns when there is nothing to compare: the window leaves an image, the plane goes through a camera
+  // or is seen from behind, or the reference window has no texture.
+  static constexpr float kNoScore = -2.0F;
+
+  struct Options {
+    int window_radius = 3;              // s, px: (2 s + 1)^2 pixels, 1..7 (section 3.6: 2 or 3)
+    double min_texture_sigma = 1.0;     // standard deviation of the reference window, grey levels, >= 0
+  };
+
+  PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options);
+  ~PatchScorer();
+
+  const Camera& reference() const { return reference_.camera; }
+  const SamplingImage& reference_image() const { return *reference_.grey; }
+  int targets() const { return static_cast<int>(targets_.size()); }
+  const ScoredView& target(int i) const { return targets_[static_cast<size_t>(i)]; }
+  const Options& options() const { return options_; }
+
+  // The reference window around integer pixel (x, y), made once and compared many times.
+  struct Window {
+    alignas(32) float values[232];  // zero mean, unit norm; padded with zeros to whole vectors
+    float sigma = 0;                // grey levels
+    bool usable = false;            // inside the image and textured
+  };
+  void MakeWindow(int x, int y, Window& window) const;
+
+  // NCC in [-1, 1] between the window around the centre of pixel (x, y) and target i through the plane, or kNoScore.
+  float Score(const Window& window, int x, int y, const PatchPlane& plane, int target) const;
+
+  // Angle at the patch between the rays to the reference and to target i, radians.
+  double ApicalAngle(int x, int y, float inverse_depth, int target) const;
+
+ private:
+  struct Target;
+  ScoredView reference_;
+  std::vector<ScoredView> targets_;
+  Options options_;
+  std::vector<Target> geometry_;
+};
+
+}  // namespace meshwright
