@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "common/base/files.h"
+#include "common/mesh/triangle_mesh.h"
+
+namespace meshwright {
+
+// PLY 1.0 (Turk, 1994). Reads ascii and binary files of either byte order, with any scalar types and any order of
+// properties. Element vertex: x y z are required; nx ny nz, red green blue (integers 0..255, or floats 0..1), quality
+// (or confidence) and camera_index are taken when there. Element face: vertex_indices (or vertex_index); polygons
+// become fans, fewer than three corners are left out; without faces the file is a point cloud. Everything else is
+// skipped. Normals and qualities that are not finite become 0. Errors: what ReadFile says; InvalidArgument names file,
+// field, value and what was expected.
+absl::StatusOr<TriangleMesh> ReadPly(const std::string& path);
+// The same from memory. `name` stands for the file in messages.
+absl::StatusOr<TriangleMesh> ParsePly(const std::string& bytes, const std::string& name);
+
+// Which optional attributes the vertices of a written file have.
+struct PlyAttributes {
+  bool normals = false;  // float nx ny nz
+  bool colors = false;   // uchar red green blue
+  bool quality = false;  // float quality
+  bool cameras = false;  // int camera_index
+};
+
+// Writes binary little-endian PLY with the attributes that the mesh has. The file appears whole or not at all.
+absl::Status WritePly(const TriangleMesh& mesh, const std::string& path);
+
+// Writes a mesh that comes in parts, in memory that depends on the largest part only: vertices go to the output, faces
+// to a nameless temporary beside it until Commit(). The bytes are those that WritePly gives for all parts in one mesh.
+// Destroying it without Commit() leaves nothing behind.
+class PlyStreamWriter {
+ public:
+  static absl::StatusOr<PlyStreamWriter> Create(const std::string& path, const PlyAttributes& attributes);
+  PlyStreamWriter(PlyStreamWriter&& other) noexcept;
+  PlyStreamWriter& operator=(PlyStreamWriter&& other) = delete;
+  PlyStreamWriter(const PlyStreamWriter&) = delete;
+  ~PlyStreamWriter();
+
+  // Faces of `part` index the part's own vertices. The part must have every attribute named at Create; others are
+  // ignored. OutOfRange when the file would have more vertices than an index of 32 bits can tell apart.
+  absl::Status Append(const TriangleMesh& part);
+  absl::Status Commit();
+
+  int64_t vertices() const { return vertices_; }
+  int64_t faces() const { return faces_; }
+
+ private:
+  PlyStreamWriter(std::string path, const PlyAttributes& attributes, AtomicFile file, int faces_descriptor);
+
+  std::string path_;
+  PlyAttributes attributes_;
+  AtomicFile file_;
+  int faces_descriptor_ = -1;
+  int64_t vertices_ = 0;
+  int64_t faces_ = 0;
+};
+
+}  // namespace meshwright
