@@ -56,7 +56,7 @@ class PatchScorer {
 
   // The reference window around integer pixel (x, y), made once and compared many times.
   struct Window {
-    alignas(32) float values[232];  // zero mean, unit norm; padded with zeros to whole vectors
+    float values[232];      // (grey - mean) / (samples * sigma); padded with zeros to whole groups
     float sigma = 0;                // grey levels
     bool usable = false;            // inside the image and textured
   };
@@ -74,6 +74,11 @@ class PatchScorer {
   std::vector<ScoredView> targets_;
   Options options_;
   std::vector<Target> geometry_;
+  int samples_ = 0;         // (2 s + 1)^2
+  int padded_samples_ = 0;  // rounded up to whole groups of the kernel
+  std::vector<float> dx_;   // px from the window's centre, per sample
+  std::vector<float> dy_;
+  std::vector<float> weights_;  // 1 / samples_, 0 for padding
 };
 
 }  // namespace meshwright

@@ -1,0 +1,179 @@
+#include "worker/photo_consistency/patch_scorer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/LU>
+
+#include "common/base/check.h"
+#include "worker/photo_consistency/ncc_kernel.h"
+
+namespace meshwright {
+namespace {
+
+// A target in which the window shrinks to less than this share of its area, or that sees the plane from behind, says
+// nothing about it.
+constexpr float kMinAreaRatio = 0.02F;
+// From a linear magnification of sqrt(2) on, a coarser level of the target matches the reference's sampling better.
+constexpr float kAreaRatioForNextLevel = 2.0F;
+// Keeps rounding in the kernel from leaving the image, px.
+constexpr float kBorderMargin = 0.05F;
+
+}  // namespace
+
+PatchPlane PlaneFromNormal(const Camera& reference, double x0, double y0, double depth,
+                           const Eigen::Vector3d& normal_in_cam) {
+  // n . (z r(x, y)) = n . (depth r0)  =>  1/z = n . r(x, y) / (depth n . r0).
+  const double denominator = depth * normal_in_cam.dot(reference.RayInCam(x0, y0));
+  return {static_cast<float>(1.0 / depth), static_cast<float>(normal_in_cam.x() / (reference.fx * denominator)),
+          static_cast<float>(normal_in_cam.y() / (reference.fy * denominator))};
+}
+
+Eigen::Vector3d NormalInCam(const Camera& reference, double x0, double y0, const PatchPlane& plane) {
+  // n / d = K^T m with m . (x, y, 1) = 1/z; m grows with n . r > 0, away from the camera: turn it round.
+  const Eigen::Vector3d m(plane.gx, plane.gy, plane.w - plane.gx * x0 - plane.gy * y0);
+  return -(reference.K().transpose() * m).normalized();
+}
+
+// K_t R K_r^-1 and K_t t, so that the homography of a plane m is a + b m^T.
+struct PatchScorer::Target {
+  Eigen::Matrix3f a;
+  Eigen::Vector3f b;
+  Eigen::Vector3d center_in_reference;  // scene units
+};
+
+PatchScorer::PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options)
+    : reference_(std::move(reference)), targets_(std::move(targets)), options_(options) {
+  MW_CHECK(options_.window_radius >= 1 && options_.window_radius <= 7);
+  const int side = 2 * options_.window_radius + 1;
+  samples_ = side * side;
+  padded_samples_ = (samples_ + kNccGroup - 1) / kNccGroup * kNccGroup;
+  dx_.assign(static_cast<size_t>(padded_samples_), 0.0F);
+  dy_.assign(static_cast<size_t>(padded_samples_), 0.0F);
+  weights_.assign(static_cast<size_t>(padded_samples_), 0.0F);
+  for (int k = 0; k < samples_; ++k) {
+    dx_[static_cast<size_t>(k)] = static_cast<float>(k % side - options_.window_radius);
+    dy_[static_cast<size_t>(k)] = static_cast<float>(k / side - options_.window_radius);
+    weights_[static_cast<size_t>(k)] = 1.0F / static_cast<float>(samples_);
+  }
+  for (const ScoredView& view : targets_) {
+    const Rigid3 target_from_reference = view.camera.cam_from_world * Inverse(reference_.camera.cam_from_world);
+    // Sampling coordinates have the centre of the top-left pixel at (0, 0).
+    Eigen::Matrix3d k_target = view.camera.K();
+    k_target(0, 2) -= 0.5;
+    k_target(1, 2) -= 0.5;
+    geometry_.push_back({(k_target * target_from_reference.rotation * reference_.camera.K().inverse()).cast<float>(),
+                         (k_target * target_from_reference.translation).cast<float>(),
+                         Inverse(target_from_reference).translation});
+  }
+}
+
+PatchScorer::~PatchScorer() = default;
+
+void PatchScorer::MakeWindow(int x, int y, Window& window) const {
+  const int radius = options_.window_radius;
+  const SamplingImage& image = *reference_.grey;
+  window.usable = false;
+  window.sigma = 0;
+  if (x < radius || y < radius || x + radius >= image.width() || y + radius >= image.height()) return;
+  const SamplingImage::Level& level = image.level(0);
+  int sum = 0;
+  int sum_of_squares = 0;
+  int k = 0;
+  for (int row = y - radius; row <= y + radius; ++row) {
+    const uint32_t* quads = &level.quads[static_cast<size_t>(row) * static_cast<size_t>(level.width) +
+                                         static_cast<size_t>(x - radius)];
+    for (int column = 0; column <= 2 * radius; ++column) {
+      const int value = static_cast<int>(quads[column] & 0xFFU);
+      sum += value;
+      sum_of_squares += value * value;
+      window.values[k++] = static_cast<float>(value);
+    }
+  }
+  const auto n = static_cast<float>(samples_);
+  // Integers up to here: exact.
+  const float variance =
+      static_cast<float>(static_cast<int64_t>(samples_) * sum_of_squares - static_cast<int64_t>(sum) * sum) / (n * n);
+  window.sigma = std::sqrt(variance);
+  if (window.sigma < options_.min_texture_sigma || window.sigma <= 0) return;
+  const float mean = static_cast<float>(sum) / n;
+  const float scale = 1.0F / (n * window.sigma);
+  for (int i = 0; i < samples_; ++i) window.values[i] = (window.values[i] - mean) * scale;
+  for (int i = samples_; i < padded_samples_; ++i) window.values[i] = 0.0F;
+  window.usable = true;
+}
+
+float PatchScorer::Score(const Window& window, int x, int y, const PatchPlane& plane, int target) const {
+  if (!window.usable || !(plane.w > 0)) return kNoScore;
+  const Target& geometry = geometry_[static_cast<size_t>(target)];
+  const float x0 = static_cast<float>(x) + 0.5F;
+  const float y0 = static_cast<float>(y) + 0.5F;
+  NccInput input;
+  for (int i = 0; i < 3; ++i) {
+    input.c[i] = geometry.a(i, 0) * x0 + geometry.a(i, 1) * y0 + geometry.a(i, 2) + geometry.b(i) * plane.w;
+    input.col0[i] = geometry.a(i, 0) + geometry.b(i) * plane.gx;
+    input.col1[i] = geometry.a(i, 1) + geometry.b(i) * plane.gy;
+  }
+  const auto radius = static_cast<float>(options_.window_radius);
+  // The plane must lie in front of both cameras over the whole window: third coordinate and inverse depth are affine, so
+  // their smallest values lie in corners.
+  const float min_third = input.c[2] - radius * (std::fabs(input.col0[2]) + std::fabs(input.col1[2]));
+  const float min_inverse_depth = plane.w - radius * (std::fabs(plane.gx) + std::fabs(plane.gy));
+  if (!(min_third > 0) || !(min_inverse_depth > 0)) return kNoScore;
+
+  const float px = input.c[0] / input.c[2];
+  const float py = input.c[1] / input.c[2];
+  // Area ratio of the window's image: the Jacobian of the homography at the centre.
+  const float jacobian = ((input.col0[0] - px * input.col0[2]) * (input.col1[1] - py * input.col1[2]) -
+                          (input.col1[0] - px * input.col1[2]) * (input.col0[1] - py * input.col0[2])) /
+                         (input.c[2] * input.c[2]);
+  if (!(jacobian > kMinAreaRatio)) return kNoScore;
+
+  const SamplingImage& image = *targets_[static_cast<size_t>(target)].grey;
+  int level_index = 0;
+  float ratio = jacobian;
+  while (ratio > kAreaRatioForNextLevel && level_index + 1 < image.level_count()) {
+    ratio *= 0.25F;
+    ++level_index;
+  }
+  const SamplingImage::Level& level = image.level(level_index);
+  if (level_index > 0) {
+    // (x + 0.5) / 2^l - 0.5 in coordinates that count from pixel centres.
+    const float scale = 1.0F / static_cast<float>(1 << level_index);
+    const float shift = 0.5F * scale - 0.5F;
+    for (int i = 0; i < 2; ++i) {
+      input.c[i] = input.c[i] * scale + input.c[2] * shift;
+      input.col0[i] = input.col0[i] * scale + input.col0[2] * shift;
+      input.col1[i] = input.col1[i] * scale + input.col1[2] * shift;
+    }
+  }
+  // A homography maps the window to a convex quadrilateral: it lies in the image when its corners do.
+  const float max_x = static_cast<float>(level.width - 1) - kBorderMargin;
+  const float max_y = static_cast<float>(level.height - 1) - kBorderMargin;
+  for (const float corner_x : {-radius, radius}) {
+    for (const float corner_y : {-radius, radius}) {
+      const float third = input.c[2] + input.col0[2] * corner_x + input.col1[2] * corner_y;
+      const float tx = (input.c[0] + input.col0[0] * corner_x + input.col1[0] * corner_y) / third;
+      const float ty = (input.c[1] + input.col0[1] * corner_x + input.col1[1] * corner_y) / third;
+      if (!(tx >= kBorderMargin && ty >= kBorderMargin && tx <= max_x && ty <= max_y)) return kNoScore;
+    }
+  }
+  input.count = padded_samples_;
+  input.dx = dx_.data();
+  input.dy = dy_.data();
+  input.weights = weights_.data();
+  input.values = window.values;
+  input.quads = level.quads.data();
+  input.stride = level.width;
+  return Ncc(input);
+}
+
+double PatchScorer::ApicalAngle(int x, int y, float inverse_depth, int target) const {
+  const Eigen::Vector3d x_in_cam = reference_.camera.RayInCam(x + 0.5, y + 0.5) / inverse_depth;
+  const Eigen::Vector3d to_target = geometry_[static_cast<size_t>(target)].center_in_reference - x_in_cam;
+  const double cosine = -x_in_cam.dot(to_target) / (x_in_cam.norm() * to_target.norm());
+  return std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
+}  // namespace meshwright

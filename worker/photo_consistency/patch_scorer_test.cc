@@ -1,0 +1,214 @@
+#include "worker/photo_consistency/patch_scorer.h"
+
+#include <cmath>
+#include <optional>
+#include <random>
+#include <set>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+
+namespace meshwright {
+namespace {
+
+GreyImage Noise(int width, int height, uint32_t seed) {
+  std::mt19937 generator(seed);
+  std::vector<double> values(static_cast<size_t>(width) * static_cast<size_t>(height));
+  for (double& value : values) value = static_cast<double>(generator() % 256);
+  GreyImage image{width, height, std::vector<uint8_t>(values.size())};
+  // Smoothed, so that interpolation is meaningful.
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      double sum = 0;
+      int count = 0;
+      for (int j = std::max(0, y - 1); j <= std::min(height - 1, y + 1); ++j) {
+        for (int i = std::max(0, x - 1); i <= std::min(width - 1, x + 1); ++i) {
+          sum += values[static_cast<size_t>(j * width + i)];
+          ++count;
+        }
+      }
+      image.grey[static_cast<size_t>(y * width + x)] = static_cast<uint8_t>(sum / count);
+    }
+  }
+  return image;
+}
+
+Camera MakeCamera(int width, int height, const Eigen::Vector3d& center, double yaw) {
+  Camera camera{.width = width, .height = height, .fx = 200, .fy = 205, .cx = width / 2.0 + 3, .cy = height / 2.0 - 2};
+  camera.cam_from_world.rotation = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  camera.cam_from_world.translation = -(camera.cam_from_world.rotation * center);
+  return camera;
+}
+
+double Bilinear(const GreyImage& image, double x, double y) {
+  const int column = static_cast<int>(std::floor(x - 0.5));
+  const int row = static_cast<int>(std::floor(y - 0.5));
+  const double fx = x - 0.5 - column;
+  const double fy = y - 0.5 - row;
+  return (1 - fy) * ((1 - fx) * image.At(column, row) + fx * image.At(column + 1, row)) +
+         fy * ((1 - fx) * image.At(column, row + 1) + fx * image.At(column + 1, row + 1));
+}
+
+// The definition, written down in double precision: every pixel of the window goes to the plane and into the target.
+std::optional<double> SlowScore(const GreyImage& reference_image, const Camera& reference, const GreyImage& target_image,
+                                const Camera& target, int x, int y, const PatchPlane& plane, int radius) {
+  std::vector<double> r;
+  std::vector<double> t;
+  for (int dy = -radius; dy <= radius; ++dy) {
+    for (int dx = -radius; dx <= radius; ++dx) {
+      const double inverse_depth = plane.w + plane.gx * dx + plane.gy * dy;
+      const Eigen::Vector3d x_in_world = reference.BackProject(x + dx + 0.5, y + dy + 0.5, 1 / inverse_depth);
+      const Eigen::Vector3d x_in_target = target.CamFromWorld(x_in_world);
+      const Eigen::Vector2d pixel = target.ProjectFromCam(x_in_target);
+      if (inverse_depth <= 0 || x_in_target.z() <= 0 || !target.Contains(pixel, 0.6)) return std::nullopt;
+      r.push_back(reference_image.At(x + dx, y + dy));
+      t.push_back(Bilinear(target_image, pixel.x(), pixel.y()));
+    }
+  }
+  const double n = static_cast<double>(r.size());
+  double mean_r = 0;
+  double mean_t = 0;
+  for (size_t i = 0; i < r.size(); ++i) {
+    mean_r += r[i] / n;
+    mean_t += t[i] / n;
+  }
+  double rr = 0;
+  double tt = 0;
+  double rt = 0;
+  for (size_t i = 0; i < r.size(); ++i) {
+    rr += (r[i] - mean_r) * (r[i] - mean_r);
+    tt += (t[i] - mean_t) * (t[i] - mean_t);
+    rt += (r[i] - mean_r) * (t[i] - mean_t);
+  }
+  return rt / std::sqrt(rr * tt);
+}
+
+struct TwoViews {
+  GreyImage reference_image = Noise(120, 100, 1);
+  GreyImage target_image = Noise(140, 110, 2);
+  Camera reference = MakeCamera(120, 100, {0, 0, 0}, 0);
+  Camera target = MakeCamera(140, 110, {0.4, 0.05, 0.1}, 0.15);
+
+  PatchScorer Scorer(int radius, int levels = 1) const {
+    return PatchScorer({reference, std::make_shared<SamplingImage>(reference_image, 1)},
+                       {{target, std::make_shared<SamplingImage>(target_image, levels)}},
+                       {.window_radius = radius, .min_texture_sigma = 1.0});
+  }
+};
+
+TEST(PatchScorer, EqualsItsDefinition) {
+  const TwoViews views;
+  std::mt19937 generator(3);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  int compared = 0;
+  for (const int radius : {1, 2, 3, 4, 5, 7}) {
+    const PatchScorer scorer = views.Scorer(radius);
+    for (int i = 0; i < 300; ++i) {
+      const int x = static_cast<int>(generator() % 120);
+      const int y = static_cast<int>(generator() % 100);
+      const PatchPlane plane{0.4F + 0.2F * uniform(generator), 0.004F * uniform(generator), 0.004F * uniform(generator)};
+      PatchScorer::Window window;
+      scorer.MakeWindow(x, y, window);
+      const float fast = scorer.Score(window, x, y, plane, 0);
+      if (!window.usable || fast == PatchScorer::kNoScore) continue;
+      const std::optional<double> slow =
+          SlowScore(views.reference_image, views.reference, views.target_image, views.target, x, y, plane, radius);
+      if (!slow) continue;
+      EXPECT_NEAR(fast, *slow, 2e-3) << "radius " << radius << " at " << x << ", " << y;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 300);
+}
+
+TEST(PatchScorer, PerfectMatchOfAViewWithItself) {
+  const TwoViews views;
+  Camera shifted = views.reference;
+  const PatchScorer scorer({views.reference, std::make_shared<SamplingImage>(views.reference_image, 1)},
+                           {{shifted, std::make_shared<SamplingImage>(views.reference_image, 3)}}, {});
+  PatchScorer::Window window;
+  scorer.MakeWindow(50, 50, window);
+  EXPECT_NEAR(scorer.Score(window, 50, 50, {0.3F, 0.001F, -0.002F}, 0), 1.0F, 1e-4);
+}
+
+TEST(PatchScorer, EveryInstructionSetGivesTheSameBits) {
+  const TwoViews views;
+  const PatchScorer scorer = views.Scorer(3);
+  const int64_t supported = hwy::SupportedTargets();
+  std::set<uint32_t> results;
+  int targets = 0;
+  for (int64_t remaining = supported; remaining != 0; remaining &= remaining - 1) {
+    hwy::SetSupportedTargetsForTest(remaining & -remaining);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    uint32_t bits_of_all = 0;
+    for (int i = 0; i < 200; ++i) {
+      PatchScorer::Window window;
+      scorer.MakeWindow(20 + i % 80, 20 + i % 60, window);
+      const float score = scorer.Score(window, 20 + i % 80, 20 + i % 60, {0.4F, 0.0001F * static_cast<float>(i), 0.001F}, 0);
+      uint32_t bits = 0;
+      std::memcpy(&bits, &score, sizeof(bits));
+      bits_of_all = bits_of_all * 31 + bits;
+    }
+    results.insert(bits_of_all);
+    ++targets;
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  EXPECT_GE(targets, 2);
+  EXPECT_EQ(results.size(), 1U);
+}
+
+TEST(PatchScorer, NoScoreWhereThereIsNothingToCompare) {
+  TwoViews views;
+  PatchScorer::Window window;
+  {
+    const PatchScorer scorer = views.Scorer(3);
+    scorer.MakeWindow(1, 50, window);  // leaves the reference
+    EXPECT_FALSE(window.usable);
+    scorer.MakeWindow(60, 50, window);
+    EXPECT_EQ(scorer.Score(window, 60, 50, {0, 0, 0}, 0), PatchScorer::kNoScore);        // at infinity
+    EXPECT_EQ(scorer.Score(window, 60, 50, {0.4F, 0.5F, 0}, 0), PatchScorer::kNoScore);  // through the camera
+    EXPECT_EQ(scorer.Score(window, 60, 50, {1e6F, 0, 0}, 0), PatchScorer::kNoScore);     // outside the target
+    EXPECT_EQ(scorer.Score(window, 60, 50, {std::nanf(""), 0, 0}, 0), PatchScorer::kNoScore);
+  }
+  views.reference_image.grey.assign(views.reference_image.grey.size(), 77);
+  const PatchScorer plain = views.Scorer(3);
+  plain.MakeWindow(60, 50, window);
+  EXPECT_FALSE(window.usable);
+}
+
+TEST(PatchPlane, NormalRoundTrip) {
+  const Camera camera = MakeCamera(120, 100, {0, 0, 0}, 0);
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d normal = Eigen::Vector3d(0.5 * uniform(generator), 0.5 * uniform(generator), -1).normalized();
+    const double x = 60 + 40 * uniform(generator);
+    const double y = 50 + 30 * uniform(generator);
+    const double depth = 2 + uniform(generator);
+    const PatchPlane plane = PlaneFromNormal(camera, x, y, depth, normal);
+    EXPECT_LT((NormalInCam(camera, x, y, plane) - normal).norm(), 1e-4);
+    // A neighbouring point of the plane lies on the extrapolated inverse depth.
+    const Eigen::Vector3d ray = camera.RayInCam(x + 3, y - 2);
+    const double z = depth * normal.dot(camera.RayInCam(x, y)) / normal.dot(ray);
+    EXPECT_NEAR(plane.MovedBy(3, -2).w, 1 / z, 1e-5);
+  }
+}
+
+TEST(SamplingImage, QuadsHoldTheirFourPixels) {
+  const GreyImage grey = Noise(37, 23, 9);
+  const SamplingImage image(grey, 2);
+  for (int y = 0; y + 1 < grey.height; ++y) {
+    for (int x = 0; x + 1 < grey.width; ++x) {
+      const uint32_t quad = image.level(0).quads[static_cast<size_t>(y * 37 + x)];
+      EXPECT_EQ(quad & 0xFF, grey.At(x, y));
+      EXPECT_EQ((quad >> 8) & 0xFF, grey.At(x + 1, y));
+      EXPECT_EQ((quad >> 16) & 0xFF, grey.At(x, y + 1));
+      EXPECT_EQ(quad >> 24, grey.At(x + 1, y + 1));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace meshwright
