@@ -1,6 +1,8 @@
 find_package(Threads REQUIRED)
 find_package(absl REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(JPEG REQUIRED)
+find_package(PNG REQUIRED)
 find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs)
 find_package(hwy REQUIRED)
 find_package(embree 3 REQUIRED)

@@ -1,0 +1,107 @@
+#include "common/image/decode.h"
+
+#include <filesystem>
+#include <fstream>
+#include <utility>
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include "common/base/files.h"
+#include "common/base/status_macros.h"
+#include "common/image/codecs.h"
+
+namespace meshwright {
+namespace {
+
+struct Codec {
+  bool (*looks_like)(const std::string& bytes);
+  absl::StatusOr<ImageSize> (*size)(const std::string& bytes);
+  absl::StatusOr<ColorImage> (*decode)(const std::string& bytes);
+};
+
+constexpr Codec kCodecs[] = {
+    {LooksLikeJpeg, JpegSize, DecodeJpeg}, {LooksLikePng, PngSize, DecodePng}, {LooksLikePnm, PnmSize, DecodePnm}};
+
+absl::Status Named(const std::string& name, const absl::Status& status) {
+  return absl::Status(status.code(), absl::StrCat(name, ": ", std::string(status.message())));
+}
+
+absl::StatusOr<const Codec*> FindCodec(const std::string& bytes) {
+  for (const Codec& codec : kCodecs) {
+    if (codec.looks_like(bytes)) return &codec;
+  }
+  return absl::InvalidArgumentError(bytes.empty() ? "empty file; expected a JPEG, PNG or binary PGM/PPM picture"
+                                                  : "not a JPEG, PNG or binary PGM/PPM picture");
+}
+
+absl::StatusOr<ImageSize> CheckedSize(const Codec& codec, const std::string& bytes) {
+  MW_ASSIGN_OR_RETURN(const ImageSize size, codec.size(bytes));
+  if (int64_t{size.width} * size.height > kMaxImagePixels) {
+    return absl::InvalidArgumentError(absl::StrCat("header says ", size.width, " x ", size.height,
+                                                   " px; expected at most ", kMaxImagePixels, " pixels"));
+  }
+  return size;
+}
+
+// A lying header must not make us allocate: no codec here packs more pixels than this into a byte.
+absl::Status CheckPlausible(const ImageSize& size, size_t file_bytes) {
+  constexpr int64_t kMaxPixelsPerByte = 10'000;
+  if (int64_t{size.width} * size.height <= kMaxPixelsPerByte * static_cast<int64_t>(file_bytes)) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(absl::StrCat("truncated or damaged: header says ", size.width, " x ", size.height,
+                                                 " px out of ", file_bytes, " bytes"));
+}
+
+absl::StatusOr<ImageSize> SizeFromBytes(const std::string& bytes) {
+  MW_ASSIGN_OR_RETURN(const Codec* codec, FindCodec(bytes));
+  return CheckedSize(*codec, bytes);
+}
+
+// The system's words for a folder or a device in a picture's place would be strange ones.
+absl::Status CheckRegularFile(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": not a regular file; expected a picture"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<ImageSize> ReadImageSize(const std::string& path) {
+  MW_RETURN_IF_ERROR(CheckRegularFile(path));
+  // Nearly always the header lies in the first bytes; metadata in front of it may push it further.
+  std::string beginning(size_t{1} << 16, '\0');
+  std::ifstream stream(path, std::ios::binary);
+  if (stream.read(beginning.data(), static_cast<std::streamsize>(beginning.size()))) {
+    absl::StatusOr<ImageSize> size = SizeFromBytes(beginning);
+    if (size.ok()) return size;
+  }
+  MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  absl::StatusOr<ImageSize> size = SizeFromBytes(bytes);
+  if (!size.ok()) return Named(path, size.status());
+  return size;
+}
+
+absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std::string& name) {
+  const auto decode = [&]() -> absl::StatusOr<ColorImage> {
+    MW_ASSIGN_OR_RETURN(const Codec* codec, FindCodec(bytes));
+    MW_ASSIGN_OR_RETURN(const ImageSize size, CheckedSize(*codec, bytes));
+    MW_RETURN_IF_ERROR(CheckPlausible(size, bytes.size()));
+    return codec->decode(bytes);
+  };
+  absl::StatusOr<ColorImage> image = decode();
+  if (!image.ok()) return Named(name, image.status());
+  return image;
+}
+
+absl::StatusOr<ColorImage> DecodeImage(const std::string& path) {
+  MW_RETURN_IF_ERROR(CheckRegularFile(path));
+  MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  return DecodeImageBytes(bytes, path);
+}
+
+}  // namespace meshwright

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <absl/status/statusor.h>
+
+#include "common/image/color_image.h"
+
+namespace meshwright {
+
+// Pictures with more pixels than this are refused from their header, before anything is allocated.
+constexpr int64_t kMaxImagePixels = 400'000'000;
+
+struct ImageSize {
+  int width = 0;   // px
+  int height = 0;  // px
+};
+
+// Size that a picture's header tells, read without decoding it. Errors as for DecodeImage.
+absl::StatusOr<ImageSize> ReadImageSize(const std::string& path);
+
+// Decodes a JPEG, PNG or binary PGM/PPM to 8-bit RGB: 16-bit samples are scaled down, grey is replicated, transparency
+// is dropped, an EXIF orientation is ignored (cameras are calibrated on the pixels as they are stored), colour profiles
+// and gamma likewise. A picture is decoded whole or not at all: data that end early or do not decode cleanly are an
+// error, never filled with grey. Errors name the file: NotFound (no such file), InvalidArgument (not a picture, kind
+// not supported, truncated, damaged, larger than kMaxImagePixels).
+absl::StatusOr<ColorImage> DecodeImage(const std::string& path);
+
+// The same for a file's bytes; `name` stands for the file in errors.
+absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std::string& name);
+
+}  // namespace meshwright

@@ -1,0 +1,15 @@
+#include "common/image/encode.h"
+
+#include "common/base/files.h"
+
+namespace meshwright {
+
+absl::Status WritePng(const std::string& path, const ColorImage& image) {
+  return WriteFileAtomically(path, EncodePng(image));
+}
+
+absl::Status WriteJpeg(const std::string& path, const ColorImage& image, int quality) {
+  return WriteFileAtomically(path, EncodeJpeg(image, quality));
+}
+
+}  // namespace meshwright
