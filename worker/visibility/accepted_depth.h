@@ -14,14 +14,19 @@ namespace meshwright {
 struct AcceptedDepth {
   Lattice lattice;
   std::vector<float> depth;    // z in the reference camera's frame, scene units; 0 = nothing accepted on this ray
-  std::vector<float> quality;  // photo-consistency of that patch
+  std::vector<float> quality;  // photo-consistency of that patch, 0 where nothing is accepted
 
   static AcceptedDepth Empty(const Camera& reference, int step);
 };
 
-// Adds one accepted surface M_i: its triangles are drawn into the reference camera's lattice, the closest kept. Triangles
-// that turn away from the reference camera hide nothing and are left out. Surfaces may be added in any order with the
-// same result.
-void AddAcceptedSurface(const PatchLattice& accepted, const Camera& reference, AcceptedDepth& visible, ThreadPool& pool);
+// Adds one accepted surface M_i: its triangles are drawn into the reference camera's lattice, the closest kept (of two
+// at the same depth the one of higher quality). Surfaces may be added in any order, with any number of threads, with
+// the same result.
+//
+// Left out: triangles that turn away from the reference camera (they hide nothing), triangles with a corner that is not
+// in front of it, and patches that belong to no triangle: these are not part of the mesh, so that a ray behind one must
+// still be processed.
+void AddAcceptedSurface(const PatchLattice& accepted, const Camera& reference, AcceptedDepth& visible,
+                        ThreadPool& pool);
 
 }  // namespace meshwright
