@@ -16,19 +16,19 @@ namespace meshwright {
 
 // Section 3.5 of Jancosek et al. 2009.
 struct SeedingOptions {
-  double min_apical_angle_deg = 3;    // alpha_S, degrees, 0..90
-  int min_seeds_per_pair = 10;        // m_S; pairs with fewer are removed from the incidence matrix, >= 0
-  double min_quality = 0.7;           // photo-consistency that a seed must reach, -1..1
+  double min_apical_angle_deg = 3;  // alpha_S, degrees, 0..90
+  int min_seeds_per_pair = 10;      // m_S; pairs with fewer are removed from the incidence matrix, >= 0
+  double min_quality = 0.7;         // photo-consistency that a seed must reach, -1..1
 
   absl::Status Validate() const;
 };
 
 // A seed patch on a ray of the reference lattice.
 struct Seed {
-  int32_t node = 0;        // lattice index
-  PatchPlane plane;        // inverse depth at the node and its slope
-  uint32_t sigma = 0;      // bit i: target i sees it
-  float quality = 0;       // mean NCC over sigma
+  int32_t node = 0;    // lattice index
+  PatchPlane plane;    // inverse depth at the node and its slope
+  uint32_t sigma = 0;  // bit i: target i sees it
+  float quality = 0;   // mean NCC over sigma
 };
 
 struct SparsePointObservation {
