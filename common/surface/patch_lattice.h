@@ -23,10 +23,10 @@ struct PatchLattice {
   CameraIndex camera_index = 0;
   Camera camera;
   Lattice lattice;
-  std::vector<float> depth;                     // z in the camera's frame, scene units
-  std::vector<Eigen::Vector3f> normal_in_world; // unit, towards the camera
-  std::vector<float> quality;                   // photo-consistency, in [-1, 1]
-  std::vector<std::array<uint8_t, 3>> rgb;      // the reference photograph at the node
+  std::vector<float> depth;                      // z in the camera's frame, scene units
+  std::vector<Eigen::Vector3f> normal_in_world;  // unit, towards the camera
+  std::vector<float> quality;                    // photo-consistency, in [-1, 1]
+  std::vector<std::array<uint8_t, 3>> rgb;       // the reference photograph at the node
   std::vector<uint8_t> links;
 
   static PatchLattice Empty(CameraIndex camera_index, const Camera& camera, int step) {
