@@ -91,10 +91,13 @@ AtomicFile::~AtomicFile() {
 
 absl::StatusOr<AtomicFile> AtomicFile::Create(const std::string& path) {
   static std::atomic<int> counter{0};
-  const std::string temporary = absl::StrCat(path, ".partial-", ::getpid(), "-", counter.fetch_add(1));
-  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (descriptor < 0) return SystemError("cannot create", path, errno);
-  return AtomicFile(path, temporary, descriptor);
+  while (true) {
+    const std::string temporary = absl::StrCat(path, ".partial-", ::getpid(), "-", counter.fetch_add(1));
+    // Processes of several containers may share a folder and have the same number: only one of them gets the name.
+    const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    if (descriptor >= 0) return AtomicFile(path, temporary, descriptor);
+    if (errno != EEXIST) return SystemError("cannot create", path, errno);
+  }
 }
 
 absl::Status AtomicFile::Append(absl::Span<const uint8_t> bytes) {
