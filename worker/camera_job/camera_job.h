@@ -25,6 +25,7 @@ namespace meshwright {
 // Everything that a camera job may do differently; the stages' constants with the paper's sections.
 struct CameraJobOptions {
   int lattice_step = 2;  // gamma_r, px, 1..16 (section 3.3: 1 for Middlebury, 2 for larger photographs)
+  PatchScorer::Options scoring;
   SeedingOptions seeding;
   GrowingOptions growing;
   FilteringOptions filtering;
@@ -63,6 +64,7 @@ struct CameraJobReport {
   int64_t rays_filtered = 0;         // rays with a patch in F_r
   double mrf_energy = 0;
   double mrf_lower_bound = 0;
+  double seconds_visibility = 0;     // filled in by whoever makes V_r
   double seconds_seeding = 0;        // wall
   double seconds_growing = 0;
   double seconds_filtering = 0;

@@ -176,4 +176,15 @@ double PatchScorer::ApicalAngle(int x, int y, float inverse_depth, int target) c
   return std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
+float PatchScorer::PixelsPerInverseDepth(int x, int y, float inverse_depth, int target) const {
+  const Target& geometry = geometry_[static_cast<size_t>(target)];
+  const Eigen::Vector3f image =
+      geometry.a * Eigen::Vector3f(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F, 1.0F) +
+      geometry.b * inverse_depth;
+  // Derivative of image.xy / image.z by inverse depth, where image moves by b.
+  const float dx = (geometry.b.x() - geometry.b.z() * image.x() / image.z()) / image.z();
+  const float dy = (geometry.b.y() - geometry.b.z() * image.y() / image.z()) / image.z();
+  return std::sqrt(dx * dx + dy * dy);
+}
+
 }  // namespace meshwright

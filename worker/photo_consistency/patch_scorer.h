@@ -68,6 +68,9 @@ class PatchScorer {
   // Angle at the patch between the rays to the reference and to target i, radians.
   double ApicalAngle(int x, int y, float inverse_depth, int target) const;
 
+  // How far the image of the pixel's ray point in target i moves per unit of inverse depth, px times scene units.
+  float PixelsPerInverseDepth(int x, int y, float inverse_depth, int target) const;
+
  private:
   struct Target;
   ScoredView reference_;

@@ -1,0 +1,120 @@
+#include "worker/camera_job/camera_job.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+#include <absl/time/clock.h>
+
+#include "common/base/check.h"
+#include "common/base/status_macros.h"
+
+namespace meshwright {
+namespace {
+
+class StageTimer {
+ public:
+  // Wall seconds since the last call or the construction.
+  double Lap() {
+    const absl::Time now = absl::Now();
+    return absl::ToDoubleSeconds(now - std::exchange(start_, now));
+  }
+
+ private:
+  absl::Time start_ = absl::Now();
+};
+
+PatchScorer MakeScorer(const CameraJobInput& input, const CameraJobOptions& options) {
+  std::vector<ScoredView> targets;
+  for (const JobView& target : input.targets) targets.push_back({target.camera, target.grey});
+  return PatchScorer({input.reference.camera, input.reference.grey}, std::move(targets), options.scoring);
+}
+
+std::vector<SparsePointObservation> ObservationsOf(const CameraJobInput& input) {
+  std::vector<SparsePointObservation> observations;
+  for (size_t i = 0; i < input.sparse_points.size(); ++i) {
+    SparsePointObservation observation{input.sparse_points[i], 0};
+    for (size_t t = 0; t < input.targets.size(); ++t) {
+      const auto& seen_by = input.sparse_points_seen_by[i];
+      if (std::find(seen_by.begin(), seen_by.end(), input.targets[t].camera_index) != seen_by.end()) {
+        observation.seen_by |= uint32_t{1} << t;
+      }
+    }
+    observations.push_back(observation);
+  }
+  return observations;
+}
+
+}  // namespace
+
+absl::Status CameraJobOptions::Validate() const {
+  if (lattice_step < 1 || lattice_step > 16) {
+    return absl::InvalidArgumentError(absl::StrCat("lattice_step is ", lattice_step, " px, expected 1..16"));
+  }
+  if (scoring.window_radius < 1 || scoring.window_radius > 7) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("scoring.window_radius is ", scoring.window_radius, " px, expected 1..7"));
+  }
+  if (!(scoring.min_texture_sigma >= 0)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("scoring.min_texture_sigma is ", scoring.min_texture_sigma, ", expected >= 0"));
+  }
+  MW_RETURN_IF_ERROR(seeding.Validate());
+  MW_RETURN_IF_ERROR(growing.Validate());
+  return filtering.Validate();
+}
+
+CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
+  MW_CHECK(input.targets.size() <= kMaxTargets);
+  CameraJobResult result;
+  CameraJobReport& report = result.report;
+  StageTimer timer;
+  const Camera& reference = input.reference.camera;
+  const PatchScorer scorer = MakeScorer(input, options);
+  report.rays = input.accepted.lattice.nodes();
+  report.rays_covered_before =
+      std::count_if(input.accepted.depth.begin(), input.accepted.depth.end(), [](float z) { return z > 0; });
+
+  // Section 3.5: seeds.
+  const SeedingResult seeding = FindSeeds(scorer, ObservationsOf(input), input.accepted, input.accepted.lattice,
+                                          options.seeding, pool);
+  for (size_t t = 0; t < input.targets.size(); ++t) {
+    if (seeding.seeds_per_target[t] < options.seeding.min_seeds_per_pair) {
+      result.weak_targets.push_back(input.targets[t].camera_index);
+    }
+  }
+  std::sort(result.weak_targets.begin(), result.weak_targets.end());
+  report.seeds = static_cast<int64_t>(seeding.seeds.size());
+  report.seeds_from_points = seeding.seeds_from_points;
+  report.seconds_seeding = timer.Lap();
+
+  // Section 3.6: growing.
+  const PatchStacks stacks = Grow(scorer, seeding.seeds, input.accepted, options.growing, pool);
+  report.patches_grown = static_cast<int64_t>(stacks.patches.size());
+  report.rays_grown = stacks.CountRays();
+  report.tentative_patches_scored = stacks.tentative_patches_scored;
+  report.seconds_growing = timer.Lap();
+
+  // Section 3.7: MRF filtering, then depth and normals beyond the step d_r.
+  FilteringResult filtering = FilterPatches(stacks, reference, options.filtering, pool);
+  report.mrf_energy = filtering.energy;
+  report.mrf_lower_bound = filtering.lower_bound;
+  report.seconds_filtering = timer.Lap();
+  report.tentative_patches_scored += RefineSurface(scorer, options.filtering.refinement, filtering.surface, pool);
+  result.filtered =
+      MakeFilteredSurface(filtering.surface, input.reference.camera_index, reference, *input.reference_color);
+  report.rays_filtered = result.filtered.CountPatches();
+  report.seconds_refinement = timer.Lap();
+  return result;
+}
+
+int64_t EstimateCameraJobBytes(const Camera& reference, const CameraJobOptions& options) {
+  const int64_t nodes = Lattice::For(reference, options.lattice_step).nodes();
+  // Two grown patches a ray is typical at full coverage; vectors double when they grow.
+  constexpr int64_t kPatchesPerRay = 2;
+  constexpr int64_t kBytesPerPatch = 2 * sizeof(GrownPatch) + 64;
+  constexpr int64_t kBytesPerNode = 64;
+  return nodes * (kPatchesPerRay * kBytesPerPatch + kBytesPerNode);
+}
+
+}  // namespace meshwright

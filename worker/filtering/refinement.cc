@@ -1,0 +1,175 @@
+#include "worker/filtering/refinement.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+
+namespace meshwright {
+namespace {
+
+// Rows of the lattice per piece of work.
+constexpr int kRowsPerPiece = 4;
+constexpr float kMinStepGain = 1e-6F;
+
+struct ViewScores {
+  std::array<float, 32> ncc{};
+};
+
+float MeanNcc(const PatchScorer& scorer, const PatchScorer::Window& window, int x, int y, const PatchPlane& plane,
+              uint32_t sigma) {
+  float sum = 0;
+  int count = 0;
+  for (uint32_t rest = sigma; rest != 0; rest &= rest - 1) {
+    const float ncc = scorer.Score(window, x, y, plane, __builtin_ctz(rest));
+    if (ncc == PatchScorer::kNoScore) return PatchScorer::kNoScore;
+    sum += ncc;
+    ++count;
+  }
+  return count > 0 ? sum / static_cast<float>(count) : PatchScorer::kNoScore;
+}
+
+// Sigma anew: every target may vote that agrees, an occluded view does not.
+uint32_t SelectViews(const PatchScorer& scorer, const PatchScorer::Window& window, int x, int y,
+                     const PatchPlane& plane, const RefinementOptions& options) {
+  ViewScores scores;
+  float best = -1;
+  for (int target = 0; target < scorer.targets(); ++target) {
+    scores.ncc[static_cast<size_t>(target)] = scorer.Score(window, x, y, plane, target);
+    best = std::max(best, scores.ncc[static_cast<size_t>(target)]);
+  }
+  const float threshold = std::max(static_cast<float>(options.min_view_quality),
+                                   best - static_cast<float>(options.max_view_deficit));
+  uint32_t sigma = 0;
+  for (int target = 0; target < scorer.targets(); ++target) {
+    if (scores.ncc[static_cast<size_t>(target)] >= threshold) sigma |= uint32_t{1} << target;
+  }
+  return sigma;
+}
+
+// Inverse depth that moves the patch by one pixel in the target of Sigma where it moves most.
+float InverseDepthPerPixel(const PatchScorer& scorer, int x, int y, const PatchPlane& plane, uint32_t sigma) {
+  float fastest = 0;
+  for (uint32_t rest = sigma; rest != 0; rest &= rest - 1) {
+    fastest = std::max(fastest, scorer.PixelsPerInverseDepth(x, y, plane.w, __builtin_ctz(rest)));
+  }
+  return fastest > 0 ? 1.0F / fastest : 0.0F;
+}
+
+}  // namespace
+
+absl::Status RefinementOptions::Validate() const {
+  if (rounds < 0 || rounds > 8) {
+    return absl::InvalidArgumentError(absl::StrCat("refinement.rounds is ", rounds, ", expected 0..8"));
+  }
+  if (!(first_step_px > 0)) {
+    return absl::InvalidArgumentError(absl::StrCat("refinement.first_step_px is ", first_step_px, ", expected > 0"));
+  }
+  if (slope_radius_steps < 1 || slope_radius_steps > 8) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("refinement.slope_radius_steps is ", slope_radius_steps, ", expected 1..8"));
+  }
+  return absl::OkStatus();
+}
+
+namespace {
+
+// One step of depth at one node: a parabola through three scores, taken when it does not lower the score.
+int64_t RefineDepth(const PatchScorer& scorer, const RefinementOptions& options, float step_px, int64_t node,
+                    SurfaceEstimate& surface) {
+  const auto i = static_cast<size_t>(node);
+  const int x = surface.lattice.PixelX(static_cast<int>(node % surface.lattice.columns));
+  const int y = surface.lattice.PixelY(static_cast<int>(node / surface.lattice.columns));
+  PatchPlane& plane = surface.plane[i];
+  PatchScorer::Window window;
+  scorer.MakeWindow(x, y, window);
+  if (!window.usable) return 0;
+  const uint32_t sigma = SelectViews(scorer, window, x, y, plane, options);
+  if (sigma == 0) return 1;
+  surface.sigma[i] = sigma;
+  const float step = step_px * InverseDepthPerPixel(scorer, x, y, plane, sigma);
+  const float q = MeanNcc(scorer, window, x, y, plane, sigma);
+  const float nearer = MeanNcc(scorer, window, x, y, {plane.w + step, plane.gx, plane.gy}, sigma);
+  const float further = MeanNcc(scorer, window, x, y, {plane.w - step, plane.gx, plane.gy}, sigma);
+  surface.quality[i] = q;
+  if (nearer == PatchScorer::kNoScore || further == PatchScorer::kNoScore) return 3;
+  const float curvature = nearer - 2 * q + further;
+  float offset = 0;
+  if (curvature < -kMinStepGain) {
+    offset = std::clamp(0.5F * (further - nearer) / curvature, -1.0F, 1.0F);
+  } else {
+    offset = nearer > further ? 1.0F : -1.0F;
+  }
+  plane.w += offset * step;
+  surface.quality[i] = std::max({q, nearer, further});
+  return 3;
+}
+
+// Slopes by least squares from linked neighbours' inverse depths.
+PatchPlane FitToNeighbours(const SurfaceEstimate& surface, const std::vector<PatchPlane>& planes, int column, int row,
+                           int radius, float max_difference) {
+  const Lattice& lattice = surface.lattice;
+  const PatchPlane& own = planes[static_cast<size_t>(lattice.Index(column, row))];
+  const auto step = static_cast<float>(lattice.step);
+  float sxx = 1;
+  float sxy = 0;
+  float syy = 1;
+  float sx = own.gx * step;
+  float sy = own.gy * step;
+  for (int dy = -radius; dy <= radius; ++dy) {
+    for (int dx = -radius; dx <= radius; ++dx) {
+      if ((dx == 0 && dy == 0) || !lattice.Contains(column + dx, row + dy)) continue;
+      const PatchPlane& other = planes[static_cast<size_t>(lattice.Index(column + dx, row + dy))];
+      if (!(other.w > 0)) continue;
+      const float predicted = own.w + step * (own.gx * static_cast<float>(dx) + own.gy * static_cast<float>(dy));
+      if (std::fabs(other.w - predicted) > max_difference) continue;
+      const float difference = other.w - own.w;
+      const auto fx = static_cast<float>(dx);
+      const auto fy = static_cast<float>(dy);
+      sxx += fx * fx;
+      sxy += fx * fy;
+      syy += fy * fy;
+      sx += fx * difference;
+      sy += fy * difference;
+    }
+  }
+  const float scale = 1.0F / ((sxx * syy - sxy * sxy) * step);
+  return {own.w, (syy * sx - sxy * sy) * scale, (sxx * sy - sxy * sx) * scale};
+}
+
+}  // namespace
+
+int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& options, SurfaceEstimate& surface,
+                      ThreadPool& pool) {
+  std::atomic<int64_t> scored{0};
+  const Lattice& lattice = surface.lattice;
+  const auto over_rows = [&](const auto& body) {
+    pool.ParallelFor(lattice.rows, kRowsPerPiece, [&](int64_t begin, int64_t end) {
+      for (int64_t row = begin; row < end; ++row) {
+        for (int column = 0; column < lattice.columns; ++column) {
+          if (surface.HasPatch(lattice.Index(column, static_cast<int>(row)))) body(column, static_cast<int>(row));
+        }
+      }
+    });
+  };
+  float step_px = static_cast<float>(options.first_step_px);
+  for (int round = 0; round < options.rounds; ++round) {
+    over_rows([&](int column, int row) {
+      scored += RefineDepth(scorer, options, step_px, lattice.Index(column, row), surface);
+    });
+    const std::vector<PatchPlane> refined = surface.plane;
+    over_rows([&](int column, int row) {
+      const auto node = static_cast<size_t>(lattice.Index(column, row));
+      const float reach = 3 * refined[node].w * static_cast<float>(lattice.step) /
+                          static_cast<float>(scorer.reference().focal());
+      surface.plane[node] = FitToNeighbours(surface, refined, column, row, options.slope_radius_steps, reach);
+    });
+    step_px *= 0.5F;
+  }
+  return scored;
+}
+
+}  // namespace meshwright

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+
+#include <absl/status/status.h>
+
+#include "common/base/thread_pool.h"
+#include "worker/filtering/surface_estimate.h"
+#include "worker/photo_consistency/patch_scorer.h"
+
+namespace meshwright {
+
+// Photometric refinement of the patches that the MRF chose. The paper stops at steps of d_r along the ray; here depth is
+// moved to the peak of photo-consistency, and normals follow the refined neighbours.
+struct RefinementOptions {
+  int rounds = 2;                    // 0 leaves the patches as they are, 0..8
+  double first_step_px = 0.5;        // movement in the target with the widest baseline that the first round tries, px, > 0
+  double min_view_quality = 0.5;     // a target below this NCC does not vote, -1..1
+  double max_view_deficit = 0.25;    // nor one this much below the best target, 0..2
+  int slope_radius_steps = 2;        // normals from linked neighbours this near, lattice steps, 1..8
+
+  absl::Status Validate() const;
+};
+
+// Refines depth, normal and Sigma of every patch in place. Returns how many tentative patches were scored.
+int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& options, SurfaceEstimate& surface,
+                      ThreadPool& pool);
+
+}  // namespace meshwright
