@@ -13,6 +13,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "common/base/files.h"
 
@@ -73,9 +74,7 @@ void Put(T value, bool big_endian, std::string& out) {
 
 class PlyTest : public testing::Test {
  protected:
-  PlyTest()
-      : folder_(fs::path(testing::TempDir()) /
-                (std::string("meshwright_") + testing::UnitTest::GetInstance()->current_test_info()->name())) {
+  PlyTest() : folder_(fs::path(testing::TempDir()) / ("meshwright_ply_test_" + std::to_string(::getpid()))) {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
