@@ -149,7 +149,7 @@ Camera OrbitCamera(const Camera& camera, const Eigen::Vector3d& pivot, double ya
   // Moving the camera right and up is turning the world left and down about the pivot, in the camera's frame.
   const Eigen::Vector3d pivot_in_cam = camera.CamFromWorld(pivot);
   const Eigen::Matrix3d turn =
-      (Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()))
+      (Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()))
           .toRotationMatrix();
   Camera orbited = camera;
   orbited.cam_from_world = Rigid3{turn, pivot_in_cam - turn * pivot_in_cam} * camera.cam_from_world;
