@@ -1,0 +1,268 @@
+#include "coordinator/conductor/conductor.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+
+#include "common/base/check.h"
+#include "common/base/status_macros.h"
+#include "common/surface/codec.h"
+
+namespace meshwright {
+namespace {
+
+absl::StatusOr<std::shared_ptr<const PatchLattice>> LoadSurface(BlobStore& blobs, const std::string& digest,
+                                                                CameraIndex expected_camera) {
+  MW_ASSIGN_OR_RETURN(const std::string bytes, blobs.Get(digest));
+  MW_ASSIGN_OR_RETURN(PatchLattice surface, DecodeSurface(bytes));
+  if (surface.camera_index != expected_camera) {
+    return absl::DataLossError(absl::StrCat("surface ", digest, " is of camera ", surface.camera_index,
+                                            ", expected camera ", expected_camera));
+  }
+  return std::make_shared<const PatchLattice>(std::move(surface));
+}
+
+std::string Name(SequenceNumber sequence) { return absl::StrCat("camera job ", sequence); }
+
+}  // namespace
+
+absl::Status ConductorOptions::Validate() const {
+  MW_RETURN_IF_ERROR(pairs.Validate());
+  MW_RETURN_IF_ERROR(overlap.Validate());
+  MW_RETURN_IF_ERROR(targets.Validate());
+  MW_RETURN_IF_ERROR(acceptance.Validate());
+  return ScheduleOptions{.window = window, .max_overlap_in_flight = acceptance.k_a}.Validate();
+}
+
+Conductor::Conductor(std::string reconstruction_id, const std::vector<Camera>& cameras, FeasiblePairs pairs,
+                     OverlapGraph overlaps, const ConductorOptions& options, JobStore* store, BlobStore* blobs,
+                     const Clock* clock, ThreadPool* pool)
+    : reconstruction_id_(std::move(reconstruction_id)),
+      cameras_(CameraGeometries(cameras)),
+      probes_(std::move(pairs.probes)),
+      pair_counts_(pairs.counts),
+      feasibility_source_(pairs.source),
+      overlaps_(std::move(overlaps)),
+      options_(options),
+      store_(store),
+      blobs_(blobs),
+      clock_(clock),
+      pool_(pool),
+      schedule_(std::move(pairs.matrix), overlaps_,
+                ScheduleOptions{.window = options.window, .max_overlap_in_flight = options.acceptance.k_a}) {}
+
+absl::StatusOr<std::unique_ptr<Conductor>> Conductor::Open(const std::string& reconstruction_id,
+                                                           const std::vector<Camera>& cameras,
+                                                           const std::vector<SparsePoint>& points,
+                                                           const ConductorOptions& options, JobStore* store,
+                                                           BlobStore* blobs, const Clock* clock, ThreadPool* pool) {
+  MW_RETURN_IF_ERROR(options.Validate());
+  MW_RETURN_IF_ERROR(store->GetReconstruction(reconstruction_id).status());
+  MW_ASSIGN_OR_RETURN(FeasiblePairs pairs, FindFeasiblePairs(cameras, points, options.pairs, *pool));
+  OverlapGraph overlaps = FindOverlaps(CameraGeometries(cameras), pairs.probes, pairs.matrix, options.overlap, *pool);
+  auto conductor = std::unique_ptr<Conductor>(new Conductor(reconstruction_id, cameras, std::move(pairs),
+                                                            std::move(overlaps), options, store, blobs, clock, pool));
+  MW_ASSIGN_OR_RETURN(const std::vector<CameraJob> jobs, store->ListCameraJobs(reconstruction_id));
+  MW_ASSIGN_OR_RETURN(const std::vector<Commit> commits, store->ListCommits(reconstruction_id));
+  const std::lock_guard<std::mutex> lock(conductor->mutex_);
+  MW_RETURN_IF_ERROR(conductor->Replay(jobs, commits));
+  return conductor;
+}
+
+absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::vector<Commit>& commits) {
+  if (jobs.size() < commits.size()) return absl::DataLossError("the store holds commits without jobs");
+  for (size_t i = 0; i < commits.size(); ++i) {
+    const Commit& commit = commits[i];
+    if (schedule_.in_flight().empty() || schedule_.in_flight().front().camera != commit.camera ||
+        schedule_.in_flight().front().sequence != commit.sequence) {
+      return absl::DataLossError(absl::StrCat("commit ", commit.sequence, " (camera ", commit.camera,
+                                              ") is not what this scene and these options give"));
+    }
+    const Outcome outcome = {.filtered_digest = jobs[i].filtered_digest,
+                             .weak_targets = jobs[i].weak_targets,
+                             .set_aside = jobs[i].state == CameraJobState::kSetAside};
+    MW_RETURN_IF_ERROR(schedule_.Commit(RecordFor(schedule_.in_flight().front(), outcome)));
+    Remember(commit, outcome);
+  }
+  for (const Assignment& assignment : schedule_.TakeChoices()) {
+    const auto index = static_cast<size_t>(assignment.sequence) - 1;
+    if (index >= jobs.size()) {
+      MW_RETURN_IF_ERROR(Assign(assignment));
+      continue;
+    }
+    const CameraJob& job = jobs[index];
+    if (job.camera != assignment.camera || job.snapshot != assignment.snapshot) {
+      return absl::DataLossError(
+          absl::StrCat(Name(job.sequence), " (camera ", job.camera, ") is not what this scene and these options give"));
+    }
+    if (job.state == CameraJobState::kAssigned) {
+      MW_ASSIGN_OR_RETURN(const int64_t epoch,
+                          store_->ReassignCameraJob(reconstruction_id_, job.sequence, clock_->Now()));
+      ready_.push_back(SpecFor(assignment, epoch));
+    } else {
+      finished_[job.sequence] = {.filtered_digest = job.filtered_digest,
+                                 .weak_targets = job.weak_targets,
+                                 .set_aside = job.state == CameraJobState::kSetAside};
+    }
+  }
+  return CommitWhatIsNext();
+}
+
+absl::Status Conductor::Assign(const Assignment& assignment) {
+  MW_RETURN_IF_ERROR(store_->AssignCameraJob(reconstruction_id_, assignment.sequence, assignment.camera,
+                                             assignment.snapshot, clock_->Now()));
+  ready_.push_back(SpecFor(assignment, 1));
+  return absl::OkStatus();
+}
+
+std::vector<CameraJobSpec> Conductor::TakeJobs() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::exchange(ready_, {});
+}
+
+absl::Status Conductor::Complete(SequenceNumber sequence, int64_t epoch, const std::string& filtered_digest,
+                                 const std::vector<CameraIndex>& weak_targets, const std::string& report_json) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (sequence <= schedule_.commits()) return absl::OkStatus();
+  MW_ASSIGN_OR_RETURN(const Assignment* const assignment, FindInFlight(sequence));
+  for (const CameraIndex target : weak_targets) {
+    if (!std::binary_search(assignment->neighbours.begin(), assignment->neighbours.end(), target)) {
+      return absl::InvalidArgumentError(absl::StrCat(Name(sequence), ": weak target ", target,
+                                                     ", expected a neighbour of camera ", assignment->camera));
+    }
+  }
+  MW_ASSIGN_OR_RETURN(const bool durable, blobs_->Has(filtered_digest));
+  if (!durable) {
+    return absl::FailedPreconditionError(
+        absl::StrCat(Name(sequence), ": its surface ", filtered_digest, " is not in the blob store"));
+  }
+  MW_RETURN_IF_ERROR(store_->CompleteCameraJob(reconstruction_id_, sequence, epoch, filtered_digest, weak_targets,
+                                               report_json, clock_->Now()));
+  finished_[sequence] = {.filtered_digest = filtered_digest, .weak_targets = weak_targets, .set_aside = false};
+  return CommitWhatIsNext();
+}
+
+absl::Status Conductor::SetAside(SequenceNumber sequence, int64_t epoch, const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (sequence <= schedule_.commits()) return absl::OkStatus();
+  MW_RETURN_IF_ERROR(FindInFlight(sequence).status());
+  MW_RETURN_IF_ERROR(store_->SetCameraJobAside(reconstruction_id_, sequence, epoch, reason, clock_->Now()));
+  finished_[sequence] = {.filtered_digest = "", .weak_targets = {}, .set_aside = true};
+  return CommitWhatIsNext();
+}
+
+absl::StatusOr<const Assignment*> Conductor::FindInFlight(SequenceNumber sequence) const {
+  for (const Assignment& assignment : schedule_.in_flight()) {
+    if (assignment.sequence == sequence) return &assignment;
+  }
+  return absl::NotFoundError(absl::StrCat(Name(sequence), " was not handed out"));
+}
+
+absl::Status Conductor::CommitWhatIsNext() {
+  while (!schedule_.in_flight().empty()) {
+    const Assignment assignment = schedule_.in_flight().front();
+    const auto found = finished_.find(assignment.sequence);
+    if (found == finished_.end()) break;
+    const Outcome& outcome = found->second;
+    Commit commit = {.sequence = assignment.sequence, .camera = assignment.camera};
+    if (!outcome.set_aside) {
+      MW_ASSIGN_OR_RETURN(commit, Accept(assignment, outcome.filtered_digest));
+    }
+    MW_RETURN_IF_ERROR(store_->AddCommit(reconstruction_id_, commit, clock_->Now()));
+    MW_RETURN_IF_ERROR(schedule_.Commit(RecordFor(assignment, outcome)));
+    Remember(commit, outcome);
+    finished_.erase(found);
+    for (const Assignment& choice : schedule_.TakeChoices()) MW_RETURN_IF_ERROR(Assign(choice));
+  }
+  return schedule_.finished() ? store_->SetReconstructionState(reconstruction_id_, ReconstructionState::kDone)
+                              : absl::OkStatus();
+}
+
+// Section 3.7: what of F_r is supported by the filtered surfaces of enough cameras committed before becomes M_r.
+absl::StatusOr<Commit> Conductor::Accept(const Assignment& assignment, const std::string& filtered_digest) {
+  MW_ASSIGN_OR_RETURN(const std::shared_ptr<const PatchLattice> filtered,
+                      LoadSurface(*blobs_, filtered_digest, assignment.camera));
+  std::vector<std::pair<CameraIndex, std::string>> supporters;
+  for (const CameraIndex other : overlaps_.Of(assignment.camera)) {
+    const auto found = committed_.find(other);
+    if (found == committed_.end() || found->second.filtered_digest.empty()) continue;
+    supporters.emplace_back(other, found->second.filtered_digest);
+  }
+  const auto load = [&](int i) {
+    const auto& [camera, digest] = supporters[static_cast<size_t>(i)];
+    return LoadSurface(*blobs_, digest, camera);
+  };
+  MW_ASSIGN_OR_RETURN(const AcceptanceResult result,
+                      AcceptSurface(*filtered, static_cast<int>(supporters.size()), load, options_.acceptance, *pool_));
+  Commit commit = {.sequence = assignment.sequence,
+                   .camera = assignment.camera,
+                   .filtered_patches = result.patches_filtered,
+                   .accepted_patches = result.patches_accepted};
+  if (result.patches_accepted > 0) {
+    MW_ASSIGN_OR_RETURN(commit.accepted_digest, blobs_->Put(EncodeSurface(result.accepted)));
+  }
+  return commit;
+}
+
+void Conductor::Remember(const Commit& commit, const Outcome& outcome) {
+  committed_[commit.camera] = {.filtered_digest = commit.filtered_patches > 0 ? outcome.filtered_digest : std::string(),
+                               .accepted = {.sequence = commit.sequence,
+                                            .camera = commit.camera,
+                                            .digest = commit.accepted_digest,
+                                            .patches = commit.accepted_patches}};
+  if (outcome.set_aside) ++progress_.cameras_set_aside;
+  progress_.patches_filtered += commit.filtered_patches;
+  progress_.patches_accepted += commit.accepted_patches;
+}
+
+CommitRecord Conductor::RecordFor(const Assignment& assignment, const Outcome& outcome) const {
+  // Nobody can use the image of a camera that was set aside: all its pairs go.
+  return {.sequence = assignment.sequence,
+          .camera = assignment.camera,
+          .weak_targets = outcome.set_aside ? schedule_.matrix().Neighbours(assignment.camera) : outcome.weak_targets,
+          .set_aside = outcome.set_aside};
+}
+
+CameraJobSpec Conductor::SpecFor(const Assignment& assignment, int64_t epoch) const {
+  CameraJobSpec spec = {
+      .sequence = assignment.sequence,
+      .camera = assignment.camera,
+      .snapshot = assignment.snapshot,
+      .epoch = epoch,
+      .neighbours = assignment.neighbours,
+      .targets = ChooseTargets(assignment.camera, assignment.neighbours, cameras_, probes_, options_.targets)};
+  for (const CameraIndex other : overlaps_.Of(assignment.camera)) {
+    const auto found = committed_.find(other);
+    if (found == committed_.end() || found->second.accepted.patches == 0) continue;
+    if (found->second.accepted.sequence <= assignment.snapshot) spec.accepted.push_back(found->second.accepted);
+  }
+  return spec;
+}
+
+Progress Conductor::progress() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Progress progress = progress_;
+  progress.cameras_committed = schedule_.commits();
+  progress.cameras_in_flight = static_cast<int>(schedule_.in_flight().size());
+  progress.cameras_total = progress.cameras_committed + progress.cameras_in_flight + schedule_.waiting_cameras();
+  return progress;
+}
+
+bool Conductor::finished() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return schedule_.finished();
+}
+
+std::vector<AcceptedSurface> Conductor::AcceptedSurfaces() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<AcceptedSurface> surfaces;
+  for (const auto& [camera, committed] : committed_) {
+    if (committed.accepted.patches > 0) surfaces.push_back(committed.accepted);
+  }
+  std::sort(surfaces.begin(), surfaces.end(),
+            [](const AcceptedSurface& a, const AcceptedSurface& b) { return a.sequence < b.sequence; });
+  return surfaces;
+}
+
+}  // namespace meshwright

@@ -1,0 +1,152 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "common/base/clock.h"
+#include "common/base/ids.h"
+#include "common/base/thread_pool.h"
+#include "common/blob/blob_store.h"
+#include "common/geometry/camera.h"
+#include "common/scene/scene.h"
+#include "coordinator/acceptance/acceptance.h"
+#include "coordinator/incidence/feasible_pairs.h"
+#include "coordinator/incidence/overlap_graph.h"
+#include "coordinator/incidence/target_selection.h"
+#include "coordinator/schedule/schedule.h"
+#include "coordinator/store/job_store.h"
+
+namespace meshwright {
+
+// What a reconstruction may decide differently on the coordinator's side.
+struct ConductorOptions {
+  FeasiblePairOptions pairs;
+  OverlapOptions overlap;
+  TargetSelectionOptions targets;
+  int window = ScheduleOptions{}.window;  // W of the order rule, >= 1
+  AcceptanceOptions acceptance;           // its k_a is also the K_a of the order rule
+
+  absl::Status Validate() const;
+};
+
+// One accepted surface M_r in the BlobStore.
+struct AcceptedSurface {
+  SequenceNumber sequence = 0;
+  CameraIndex camera = 0;
+  std::string digest;
+  int64_t patches = 0;
+};
+
+// What a worker needs to know to process one reference camera.
+struct CameraJobSpec {
+  SequenceNumber sequence = 0;
+  CameraIndex camera = 0;
+  SequenceNumber snapshot = 0;
+  int64_t epoch = 1;                      // to be named with the result
+  std::vector<CameraIndex> neighbours;    // O_r as of the snapshot, ascending
+  std::vector<CameraIndex> targets;       // the chosen part of it, best first
+  std::vector<AcceptedSurface> accepted;  // what may hide something from r: accepted in commits <= snapshot by cameras
+                                          // that overlap r; by camera. V_r is made of these
+};
+
+struct Progress {
+  int cameras_total = 0;      // committed, in flight and still waiting; shrinks when pruning leaves a camera no pair
+  int cameras_committed = 0;  // set aside ones included
+  int cameras_set_aside = 0;
+  int cameras_in_flight = 0;
+  int64_t patches_filtered = 0;  // over committed cameras
+  int64_t patches_accepted = 0;
+};
+
+// Conducts one reconstruction: which camera is processed when (schedule), what it is given (targets, accepted
+// surfaces), which of its patches are accepted (section 3.7, Jancosek et al. 2009), in the one order of the order rule.
+// Everything that has happened is in the JobStore; opening replays it, so a conductor may die at any moment. It has no
+// threads and knows nothing of how jobs are done.
+//
+// Thread-safe: calls take a mutex. Complete() and SetAside() commit whatever has become next in line, which loads the
+// filtered surfaces of overlapping cameras one after the other (tenths of a second each on large photographs); at most
+// three surfaces are in memory. Errors of the store and the BlobStore come back as they are; after one, a conductor
+// opened anew is in order.
+class Conductor {
+ public:
+  // The reconstruction must exist in `store`. `store`, `blobs`, `clock` and `pool` outlive the conductor. Jobs that
+  // were handed out before and not finished get a new epoch and are handed out again. FailedPrecondition when no pair
+  // of cameras is feasible; DataLoss when the store's rows are not of this scene and these options.
+  static absl::StatusOr<std::unique_ptr<Conductor>> Open(const std::string& reconstruction_id,
+                                                         const std::vector<Camera>& cameras,
+                                                         const std::vector<SparsePoint>& points,
+                                                         const ConductorOptions& options, JobStore* store,
+                                                         BlobStore* blobs, const Clock* clock, ThreadPool* pool);
+
+  // Jobs that may start now and were not taken since the last commit that made them possible. Often empty.
+  std::vector<CameraJobSpec> TakeJobs();
+
+  // The result of a job: F_r, durable in the BlobStore under `filtered_digest`; `weak_targets` are pairs with fewer
+  // than m_S seeds; `report_json` is kept as it is. In any order; repeating it is harmless. Aborted: the job was handed
+  // out again, drop the result.
+  absl::Status Complete(SequenceNumber sequence, int64_t epoch, const std::string& filtered_digest,
+                        const std::vector<CameraIndex>& weak_targets, const std::string& report_json);
+  // Gives a job up: its camera contributes nothing and is nobody's target any more.
+  absl::Status SetAside(SequenceNumber sequence, int64_t epoch, const std::string& reason);
+
+  Progress progress() const;
+  // All cameras are committed.
+  bool finished() const;
+  // In the order of commits, which is the order of the mesh.
+  std::vector<AcceptedSurface> AcceptedSurfaces() const;
+
+  const FeasiblePairCounts& pair_counts() const { return pair_counts_; }
+  FeasibilitySource feasibility_source() const { return feasibility_source_; }
+
+ private:
+  struct Outcome {  // of a finished job
+    std::string filtered_digest;
+    std::vector<CameraIndex> weak_targets;
+    bool set_aside = false;
+  };
+  struct Committed {
+    std::string filtered_digest;  // "" when there is no patch in it
+    AcceptedSurface accepted;     // its digest is "" when nothing was accepted
+  };
+
+  Conductor(std::string reconstruction_id, const std::vector<Camera>& cameras, FeasiblePairs pairs,
+            OverlapGraph overlaps, const ConductorOptions& options, JobStore* store, BlobStore* blobs,
+            const Clock* clock, ThreadPool* pool);
+
+  absl::Status Replay(const std::vector<CameraJob>& jobs, const std::vector<Commit>& commits);
+  absl::Status Assign(const Assignment& assignment);
+  absl::StatusOr<const Assignment*> FindInFlight(SequenceNumber sequence) const;
+  absl::Status CommitWhatIsNext();
+  absl::StatusOr<Commit> Accept(const Assignment& assignment, const std::string& filtered_digest);
+  void Remember(const Commit& commit, const Outcome& outcome);
+  CommitRecord RecordFor(const Assignment& assignment, const Outcome& outcome) const;
+  CameraJobSpec SpecFor(const Assignment& assignment, int64_t epoch) const;
+
+  const std::string reconstruction_id_;
+  const std::vector<CameraGeometry> cameras_;
+  const std::vector<CameraProbes> probes_;
+  const FeasiblePairCounts pair_counts_;
+  const FeasibilitySource feasibility_source_;
+  const OverlapGraph overlaps_;
+  const ConductorOptions options_;
+  JobStore* const store_;
+  BlobStore* const blobs_;
+  const Clock* const clock_;
+  ThreadPool* const pool_;
+
+  mutable std::mutex mutex_;
+  Schedule schedule_;
+  std::vector<CameraJobSpec> ready_;            // chosen and not taken
+  std::map<SequenceNumber, Outcome> finished_;  // finished and not committed
+  std::map<CameraIndex, Committed> committed_;
+  Progress progress_;
+};
+
+}  // namespace meshwright
