@@ -1,0 +1,142 @@
+#include "common/scene/colmap_model.h"
+
+#include <filesystem>
+
+#include <absl/strings/str_cat.h>
+
+#include "common/base/status_macros.h"
+
+namespace meshwright {
+namespace {
+
+constexpr ColmapModelType kTypes[] = {
+    {0, "SIMPLE_PINHOLE", Lens::Model::kPinhole, 3, true},
+    {1, "PINHOLE", Lens::Model::kPinhole, 4, false},
+    {2, "SIMPLE_RADIAL", Lens::Model::kRadial, 4, true},
+    {3, "RADIAL", Lens::Model::kRadial, 5, true},
+    {4, "OPENCV", Lens::Model::kOpenCv, 8, false},
+    {5, "OPENCV_FISHEYE", Lens::Model::kOpenCvFisheye, 8, false},
+    {6, "FULL_OPENCV", Lens::Model::kFullOpenCv, 12, false},
+    {7, "FOV", Lens::Model::kFov, 5, false},
+    {8, "SIMPLE_RADIAL_FISHEYE", Lens::Model::kRadialFisheye, 4, true},
+    {9, "RADIAL_FISHEYE", Lens::Model::kRadialFisheye, 5, true},
+    {10, "THIN_PRISM_FISHEYE", Lens::Model::kThinPrismFisheye, 12, false},
+};
+
+// Up from the model's folder there may be sparse/0/ between it and the scene's.
+constexpr int kFoldersUp = 2;
+
+}  // namespace
+
+const ColmapModelType* FindColmapModelType(int id) {
+  for (const ColmapModelType& type : kTypes) {
+    if (type.id == id) return &type;
+  }
+  return nullptr;
+}
+
+const ColmapModelType* FindColmapModelType(std::string_view name) {
+  for (const ColmapModelType& type : kTypes) {
+    if (type.name == name) return &type;
+  }
+  return nullptr;
+}
+
+std::string KnownColmapModelTypes() {
+  std::string names;
+  for (const ColmapModelType& type : kTypes) absl::StrAppend(&names, names.empty() ? "" : ", ", type.name);
+  return names;
+}
+
+absl::Status ColmapSceneBuilder::AddCamera(const Place& place, uint32_t camera_id, const ColmapModelType& type,
+                                           int64_t width, int64_t height, const std::vector<double>& parameters) {
+  constexpr int64_t kLargestSide = 1'000'000;  // px; CheckLens holds the product
+  if (width < 1 || height < 1 || width > kLargestSide || height > kLargestSide) {
+    return FieldError(place, "image size", absl::StrCat(width, " x ", height),
+                      absl::StrCat("sizes from 1 to ", kLargestSide, " px"));
+  }
+  Lens lens{.width = static_cast<int>(width), .height = static_cast<int>(height), .model = type.model};
+  const size_t focals = type.single_focal ? 1 : 2;
+  lens.fx = parameters[0];
+  lens.fy = parameters[focals - 1];
+  lens.cx = parameters[focals];
+  lens.cy = parameters[focals + 1];
+  // Our coefficients stand in COLMAP's order.
+  for (size_t i = focals + 2; i < parameters.size(); ++i) lens.coefficients[i - focals - 2] = parameters[i];
+  MW_RETURN_IF_ERROR(CheckLens(lens, place));
+  if (!lenses_.emplace(camera_id, lens).second) {
+    return FieldError(place, "CAMERA_ID", absl::StrCat(camera_id), "an id not used before");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ColmapSceneBuilder::AddImage(const Place& place, uint32_t image_id,
+                                          const std::array<double, 4>& quaternion, const Eigen::Vector3d& translation,
+                                          uint32_t camera_id, const std::string& name, int64_t observations) {
+  const auto lens = lenses_.find(camera_id);
+  if (lens == lenses_.end()) {
+    return FieldError(place, "CAMERA_ID", absl::StrCat(camera_id), "the id of a camera in the cameras file");
+  }
+  if (!translation.allFinite()) return FieldError(place, "TX TY TZ", "not finite", "finite numbers");
+  ImportedView imported{.view = {.name = name, .image_path = "", .lens = lens->second}, .named_at = place};
+  MW_ASSIGN_OR_RETURN(imported.view.cam_from_world.rotation,
+                      RotationFromQuaternion(quaternion[0], quaternion[1], quaternion[2], quaternion[3], place));
+  imported.view.cam_from_world.translation = translation;
+  const ImageRecord record{static_cast<CameraIndex>(views_.size()), observations};
+  if (!images_.emplace(image_id, record).second) {
+    return FieldError(place, "IMAGE_ID", absl::StrCat(image_id), "an id not used before");
+  }
+  views_.push_back(std::move(imported));
+  return absl::OkStatus();
+}
+
+absl::Status ColmapSceneBuilder::AddPoint(const Place& place, const Eigen::Vector3d& x_in_world,
+                                          const std::array<uint8_t, 3>& rgb,
+                                          const std::vector<std::pair<uint32_t, uint32_t>>& track) {
+  if (!x_in_world.allFinite()) return FieldError(place, "X Y Z", "not finite", "finite numbers");
+  SparsePoint point{.x_in_world = x_in_world, .rgb = rgb, .seen_by = {}};
+  point.seen_by.reserve(track.size());
+  for (const auto& [image_id, index] : track) {
+    const auto image = images_.find(image_id);
+    if (image == images_.end()) {
+      return FieldError(place, "IMAGE_ID in the track", absl::StrCat(image_id),
+                        "the id of an image in the images file");
+    }
+    // Some programs write tracks but leave the images' own lists empty.
+    if (image->second.observations > 0 && index >= image->second.observations) {
+      return FieldError(place, "POINT2D_IDX in the track", absl::StrCat(index),
+                        absl::StrCat("less than the ", image->second.observations, " points of image ", image_id));
+    }
+    point.seen_by.push_back(image->second.view);
+  }
+  points_.push_back(std::move(point));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Scene> ColmapSceneBuilder::Finish(const std::string& format, const std::string& model_folder,
+                                                 const std::string& images_file) {
+  std::vector<std::string> folders;
+  std::string folder = model_folder;
+  for (int i = 0; i <= kFoldersUp; ++i) {
+    folders.push_back(JoinPath(folder, "images"));
+    folders.push_back(JoinPath(folder, ""));
+    folder = JoinPath(folder, "..");
+  }
+  return AssembleScene(format, images_file, std::move(views_), std::move(points_), folders);
+}
+
+std::string FindColmapModelFolder(const std::string& folder, const std::string& extension) {
+  for (const char* below : {"", "model", "sparse", "sparse/0"}) {
+    std::string candidate = JoinPath(folder, below);
+    if (IsFile(JoinPath(candidate, "cameras." + extension)) && IsFile(JoinPath(candidate, "images." + extension))) {
+      return candidate;
+    }
+  }
+  return "";
+}
+
+std::string ColmapModelFiles(const std::string& extension) {
+  return absl::StrCat("cameras.", extension, " and images.", extension, " here or in model/, sparse/ or sparse/0/");
+}
+
+}  // namespace meshwright
