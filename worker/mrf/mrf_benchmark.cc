@@ -21,7 +21,7 @@ void Report(benchmark::State& state, const GridMrf& mrf, const MrfSolution& solu
 void BM_SolveGlobal(benchmark::State& state) {
   const GridMrf mrf = MakeSurfaceMrf(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)), 1);
   MrfSolution solution;
-  for (auto _ : state) solution = SolveGlobal(mrf, TrwsOptions{});
+  while (state.KeepRunning()) solution = SolveGlobal(mrf, TrwsOptions{});
   Report(state, mrf, solution);
 }
 BENCHMARK(BM_SolveGlobal)->Args({640, 480})->Args({1536, 1024})->Unit(benchmark::kMillisecond);
@@ -32,7 +32,7 @@ void BM_SolveInWindows(benchmark::State& state) {
   TrwsOptions options;
   options.window_nodes = static_cast<int>(state.range(3));
   MrfSolution solution;
-  for (auto _ : state) solution = SolveInWindows(mrf, options, pool);
+  while (state.KeepRunning()) solution = SolveInWindows(mrf, options, pool);
   Report(state, mrf, solution);
 }
 BENCHMARK(BM_SolveInWindows)

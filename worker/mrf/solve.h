@@ -16,7 +16,7 @@ struct TrwsOptions {
   int max_iterations = 50;
   // A message that would change by no more than this is left as it is, and a node whose messages stay is not visited
   // again; cost (unary costs are about 1), >= 0. 0: the textbook algorithm.
-  double message_tolerance = 5e-3;
+  double message_tolerance = 2e-3;
   // Largest side of a window A; lattice nodes, >= 2 * margin_nodes + 2. Sec. 3.7.
   int window_nodes = 256;
   // What B has more than A on each side; lattice nodes, >= 1. Sec. 3.7 ("not farther than 50 nodes from A").

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include <absl/types/span.h>
+
 #include "common/base/check.h"
 
 namespace meshwright {
 namespace {
 
-constexpr int kMaxPatches = 255;
+constexpr int kMaxPatches = 254;
 constexpr uint8_t kForwardDue = 1;
 constexpr uint8_t kBackwardDue = 2;
 
@@ -49,14 +51,14 @@ class Sender {
       const int t = node.neighbour[side];
       if (t < 0) continue;
       ending -= share;
-      bound += SendTo(s, side, t, costs, share);
+      bound += SendTo(s, side, t, absl::MakeConstSpan(costs, count), share);
     }
     return bound + ending * smallest;
   }
 
  private:
-  float SendTo(int s, Side side, int t, const float* costs, float share) {
-    const int count = problem_.node(s).patch_count;
+  float SendTo(int s, Side side, int t, absl::Span<const float> costs, float share) {
+    const int count = static_cast<int>(costs.size());
     const int target_count = problem_.node(t).patch_count;
     const float* back = problem_.Incoming(s, side);
     float* message = problem_.Incoming(t, OppositeSide(side));
@@ -126,7 +128,7 @@ uint8_t BestLabel(const float* costs, int count) {
 }  // namespace
 
 float* TrwsProblem::AddNode(int patch_count) {
-  MW_CHECK(patch_count > 0 && patch_count < kMaxPatches);
+  MW_CHECK(patch_count > 0 && patch_count <= kMaxPatches);
   Node node;
   node.block = static_cast<int32_t>(costs_.size());
   node.patch_count = patch_count;
