@@ -35,7 +35,7 @@ struct MrfSolution {
 };
 
 // Both minimise the energy approximately by TRW-S (see trws.h); labels, energy and bound do not depend on the number of
-// threads. The result is never worse than label 0 everywhere.
+// threads. The energy is always finite, and that of SolveGlobal never above label 0 everywhere.
 
 // The whole grid at once. lower_bound is that of TRW-S.
 MrfSolution SolveGlobal(const GridMrf& mrf, const TrwsOptions& options);
@@ -50,7 +50,7 @@ MrfSolution SolveGlobal(const GridMrf& mrf, const TrwsOptions& options);
 // lower_bound is a bound for the whole grid too, by dual decomposition: every edge between two windows keeps the
 // messages that the earlier window's B left on it, which moves its cost to its two ends and a rest. Then the grid falls
 // apart into the windows A, each free of any condition, whose TRW-S bounds (from a few more iterations) add up with the
-// rests' minima. It is a little looser than the global run's.
+// rests' minima. On surfaces it is about as tight as the global run's.
 MrfSolution SolveInWindows(const GridMrf& mrf, const TrwsOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
