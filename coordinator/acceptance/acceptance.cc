@@ -1,0 +1,215 @@
+#include "coordinator/acceptance/acceptance.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+
+#include "common/base/check.h"
+#include "common/base/status_macros.h"
+#include "common/geometry/level_of_detail.h"
+
+namespace meshwright {
+namespace {
+
+constexpr int64_t kRowsPerPiece = 8;
+// How much coarser than the reference a supporter's own spacing may make the ball.
+constexpr double kMaxCoarseness = 2;
+
+// Looks for patches of one supporter near points.
+class SupportIndex {
+ public:
+  explicit SupportIndex(const PatchLattice& surface) : surface_(surface) {
+    const Lattice& lattice = surface.lattice;
+    const Camera& camera = surface.camera;
+    for (int column = 0; column < lattice.columns; ++column) {
+      ray_x_.push_back(camera.RayInCam(lattice.PixelX(column) + 0.5, 0).x());
+    }
+    for (int row = 0; row < lattice.rows; ++row) ray_y_.push_back(camera.RayInCam(0, lattice.PixelY(row) + 0.5).y());
+  }
+
+  // Whether a patch centre lies within `radius` of the point (in the supporter's frame).
+  bool HasPatchNear(const Eigen::Vector3d& x_in_cam, double radius) const {
+    if (x_in_cam.z() <= radius) return false;  // a ball that holds the camera: its window would be the whole image
+    const Camera& camera = surface_.camera;
+    const Lattice& lattice = surface_.lattice;
+    const Range tangent_x = TangentRange(x_in_cam.x(), x_in_cam.z(), radius);
+    const Range tangent_y = TangentRange(x_in_cam.y(), x_in_cam.z(), radius);
+    const Eigen::Vector2d low =
+        lattice.FromPixel({camera.fx * tangent_x.low + camera.cx, camera.fy * tangent_y.low + camera.cy});
+    const Eigen::Vector2d high =
+        lattice.FromPixel({camera.fx * tangent_x.high + camera.cx, camera.fy * tangent_y.high + camera.cy});
+    if (high.x() < 0 || high.y() < 0 || low.x() > lattice.columns - 1 || low.y() > lattice.rows - 1) return false;
+    const int first_column = static_cast<int>(std::ceil(std::max(low.x(), 0.0)));
+    const int first_row = static_cast<int>(std::ceil(std::max(low.y(), 0.0)));
+    const int last_column = static_cast<int>(std::min<double>(high.x(), lattice.columns - 1));
+    const int last_row = static_cast<int>(std::min<double>(high.y(), lattice.rows - 1));
+    if (first_column > last_column || first_row > last_row) return false;
+
+    const double squared_radius = radius * radius;
+    // Where surfaces agree, the node in the middle of the window says so at once.
+    const int middle_row = (first_row + last_row) / 2;
+    if (IsNear((first_column + last_column) / 2, middle_row, x_in_cam, squared_radius)) return true;
+    const auto low_depth = static_cast<float>(x_in_cam.z() - radius) * (1 - kDepthSlack);
+    const auto high_depth = static_cast<float>(x_in_cam.z() + radius) * (1 + kDepthSlack);
+    for (int row = first_row; row <= last_row; ++row) {
+      const float* depths = surface_.depth.data() + lattice.Index(0, row);
+      for (int column = first_column; column <= last_column; ++column) {
+        if (depths[column] < low_depth || depths[column] > high_depth) continue;
+        if (IsNear(column, row, x_in_cam, squared_radius)) return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  struct Range {
+    double low = 0;
+    double high = 0;
+  };
+  // The depth test in floats only sorts out; IsNear decides.
+  static constexpr float kDepthSlack = 1e-6F;
+
+  // Exact bounds of x / z over the ball around (x, z) with z > radius: the two tangents from the camera.
+  static Range TangentRange(double x, double z, double radius) {
+    const double denominator = z * z - radius * radius;
+    const double reach = radius * std::sqrt(x * x + denominator);
+    return {(x * z - reach) / denominator, (x * z + reach) / denominator};
+  }
+
+  bool IsNear(int column, int row, const Eigen::Vector3d& x_in_cam, double squared_radius) const {
+    const double z = surface_.depth[static_cast<size_t>(surface_.lattice.Index(column, row))];
+    if (!(z > 0)) return false;
+    const double dx = z * ray_x_[static_cast<size_t>(column)] - x_in_cam.x();
+    const double dy = z * ray_y_[static_cast<size_t>(row)] - x_in_cam.y();
+    const double dz = z - x_in_cam.z();
+    return dx * dx + dy * dy + dz * dz <= squared_radius;
+  }
+
+  const PatchLattice& surface_;
+  std::vector<double> ray_x_;  // per column: x / z of the node's ray
+  std::vector<double> ray_y_;  // per row
+};
+
+// Adds one supporter's votes. Gives how many patches still lack some.
+int64_t CountSupport(const PatchLattice& filtered, const PatchLattice& supporter, const AcceptanceOptions& options,
+                     std::vector<uint8_t>& votes, ThreadPool& pool) {
+  const SupportIndex index(supporter);
+  const Camera& reference = filtered.camera;
+  const Rigid3 supporter_from_reference = supporter.camera.cam_from_world * Inverse(reference.cam_from_world);
+  const Lattice& lattice = filtered.lattice;
+  std::atomic<int64_t> undecided = 0;
+  pool.ParallelFor(lattice.rows, kRowsPerPiece, [&](int64_t begin, int64_t end) {
+    int64_t undecided_here = 0;
+    for (int row = static_cast<int>(begin); row < end; ++row) {
+      for (int column = 0; column < lattice.columns; ++column) {
+        const auto node = static_cast<size_t>(lattice.Index(column, row));
+        if (!(filtered.depth[node] > 0) || votes[node] >= options.k_a) continue;
+        const double z = filtered.depth[node];
+        const Eigen::Vector3d x_in_supporter =
+            supporter_from_reference *
+            (z * reference.RayInCam(lattice.PixelX(column) + 0.5, lattice.PixelY(row) + 0.5));
+        const double detail = LevelOfDetail(reference, z, lattice.step);
+        const double coarser = LevelOfDetail(supporter.camera, x_in_supporter.z(), supporter.lattice.step);
+        const double radius =
+            options.support_radius_steps * std::max(detail, std::min(coarser, kMaxCoarseness * detail));
+        if (index.HasPatchNear(x_in_supporter, radius)) ++votes[node];
+        undecided_here += votes[node] < options.k_a ? 1 : 0;
+      }
+    }
+    undecided += undecided_here;
+  });
+  return undecided;
+}
+
+void ClearNode(int64_t node, PatchLattice& surface) {
+  const auto i = static_cast<size_t>(node);
+  surface.depth[i] = 0;
+  surface.normal_in_world[i].setZero();
+  surface.quality[i] = 0;
+  surface.rgb[i] = {0, 0, 0};
+  surface.links[i] = 0;
+}
+
+// Clears links whose other end has no patch any more.
+void DropDanglingLinks(PatchLattice& surface) {
+  const Lattice& lattice = surface.lattice;
+  for (int row = 0; row < lattice.rows; ++row) {
+    for (int column = 0; column < lattice.columns; ++column) {
+      const int64_t node = lattice.Index(column, row);
+      uint8_t& links = surface.links[static_cast<size_t>(node)];
+      if (links == 0) continue;
+      if (column + 1 >= lattice.columns || !surface.HasPatch(node + 1)) links &= ~PatchLattice::kLinkRight;
+      if (row + 1 >= lattice.rows || !surface.HasPatch(node + lattice.columns)) links &= ~PatchLattice::kLinkDown;
+    }
+  }
+}
+
+}  // namespace
+
+absl::Status AcceptanceOptions::Validate() const {
+  if (k_a < 1 || k_a > 255) return absl::InvalidArgumentError(absl::StrCat("k_a = ", k_a, ", expected 1..255"));
+  if (!(support_radius_steps > 0)) {
+    return absl::InvalidArgumentError(absl::StrCat("support_radius_steps = ", support_radius_steps, ", expected > 0"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int supporters, const SurfaceLoader& load,
+                                               const AcceptanceOptions& options, ThreadPool& pool) {
+  MW_RETURN_IF_ERROR(options.Validate());
+  AcceptanceResult result;
+  result.patches_filtered = filtered.CountPatches();
+  std::vector<uint8_t> votes(filtered.depth.size(), 0);
+  int64_t undecided = result.patches_filtered;
+  for (int i = 0; i < supporters && undecided > 0; ++i) {
+    MW_ASSIGN_OR_RETURN(const std::shared_ptr<const PatchLattice> supporter, load(i));
+    MW_CHECK(supporter != nullptr && supporter->camera_index != filtered.camera_index);
+    ++result.supporters_loaded;
+    undecided = CountSupport(filtered, *supporter, options, votes, pool);
+  }
+  result.accepted = filtered;
+  for (size_t node = 0; node < votes.size(); ++node) {
+    if (votes[node] < options.k_a) ClearNode(static_cast<int64_t>(node), result.accepted);
+  }
+  DropDanglingLinks(result.accepted);
+  result.patches_accepted = result.accepted.CountPatches();
+  return result;
+}
+
+int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface) {
+  const Lattice& lattice = surface.lattice;
+  const int64_t columns = lattice.columns;
+  std::vector<bool> visited(surface.depth.size(), false);
+  std::vector<int64_t> component;  // its nodes; those from `next` on are still to be expanded
+  int64_t removed = 0;
+  for (int64_t seed = 0; seed < lattice.nodes(); ++seed) {
+    if (!surface.HasPatch(seed) || visited[static_cast<size_t>(seed)]) continue;
+    component.assign(1, seed);
+    visited[static_cast<size_t>(seed)] = true;
+    const auto visit = [&](int64_t node) {
+      if (visited[static_cast<size_t>(node)]) return;
+      visited[static_cast<size_t>(node)] = true;
+      component.push_back(node);
+    };
+    const auto linked = [&](int64_t node, uint8_t link) {
+      return (surface.links[static_cast<size_t>(node)] & link) != 0;
+    };
+    for (size_t next = 0; next < component.size(); ++next) {
+      const int64_t node = component[next];
+      if (linked(node, PatchLattice::kLinkRight)) visit(node + 1);
+      if (linked(node, PatchLattice::kLinkDown)) visit(node + columns);
+      if (node % columns > 0 && linked(node - 1, PatchLattice::kLinkRight)) visit(node - 1);
+      if (node >= columns && linked(node - columns, PatchLattice::kLinkDown)) visit(node - columns);
+    }
+    if (static_cast<int64_t>(component.size()) >= min_patches) continue;
+    removed += static_cast<int64_t>(component.size());
+    for (const int64_t node : component) ClearNode(node, surface);
+  }
+  return removed;
+}
+
+}  // namespace meshwright

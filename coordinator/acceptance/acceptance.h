@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "common/base/thread_pool.h"
+#include "common/surface/patch_lattice.h"
+
+namespace meshwright {
+
+// Which patches of a filtered surface become part of the mesh: section 3.7 ("Meshing") of Jancosek et al. 2009.
+struct AcceptanceOptions {
+  int k_a = 1;                      // other reference cameras that must agree, >= 1 (the paper: 2 or 3)
+  double support_radius_steps = 3;  // radius of agreement in d_r(X), > 0 (section 3.7)
+
+  absl::Status Validate() const;
+};
+
+struct AcceptanceResult {
+  PatchLattice accepted;  // M_r
+  int64_t patches_filtered = 0;
+  int64_t patches_accepted = 0;
+  int supporters_loaded = 0;
+};
+
+// Gives the i-th surface asked for. Whoever calls decides what is kept in memory; acceptance holds one at a time.
+using SurfaceLoader = std::function<absl::StatusOr<std::shared_ptr<const PatchLattice>>(int i)>;
+
+// M_r: a patch of F_r is accepted when at least k_a supporters have a filtered patch in the ball of radius
+// support_radius_steps * d_r(X) around its centre X. Links stay where both ends do. Errors are the loader's.
+//
+// A supporter i that sees X coarser than r (d_i > d_r) may have no node in so small a ball although its surface passes
+// through it: the radius is taken with d_i instead, but at most 2 d_r, so that a far camera does not support anything
+// that lies near.
+//
+// `supporters` surfaces are asked for in order, each once, until every patch is decided; the result does not depend on
+// their order.
+absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int supporters, const SurfaceLoader& load,
+                                               const AcceptanceOptions& options, ThreadPool& pool);
+
+// Removes patches of connected components (by links) with fewer than `min_patches`. Gives the number removed.
+int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface);
+
+}  // namespace meshwright

@@ -1,0 +1,222 @@
+#include "coordinator/acceptance/acceptance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "common/geometry/level_of_detail.h"
+
+namespace meshwright {
+namespace {
+
+Camera CameraAt(const Eigen::Vector3d& center_in_world, double turn, double focal) {
+  Camera camera{.width = 48, .height = 36, .fx = focal, .fy = focal * 1.05, .cx = 23, .cy = 19};
+  camera.cam_from_world.rotation = Eigen::AngleAxisd(turn, Eigen::Vector3d(0.3, 1, 0.2).normalized()).matrix();
+  camera.cam_from_world.translation = -(camera.cam_from_world.rotation * center_in_world);
+  return camera;
+}
+
+// Patches near the plane z = 10 of the world, off by up to `noise`, on a share of the rays, linked at random.
+PatchLattice RandomSurface(CameraIndex index, const Camera& camera, int step, double noise, std::mt19937& generator) {
+  std::uniform_real_distribution<double> uniform(0, 1);
+  PatchLattice surface = PatchLattice::Empty(index, camera, step);
+  const Eigen::Vector3d center = camera.center_in_world();
+  for (int row = 0; row < surface.lattice.rows; ++row) {
+    for (int column = 0; column < surface.lattice.columns; ++column) {
+      const auto node = static_cast<size_t>(surface.lattice.Index(column, row));
+      const Eigen::Vector2d pixel = surface.lattice.Pixel(column, row);
+      const double z = (10 - center.z()) / (camera.BackProject(pixel.x(), pixel.y(), 1) - center).z();
+      if (uniform(generator) < 0.3) continue;
+      surface.depth[node] = static_cast<float>(z * (1 + noise * (2 * uniform(generator) - 1)));
+      surface.normal_in_world[node] = {0, 0, -1};
+      surface.quality[node] = 0.9F;
+      surface.rgb[node] = {1, 2, 3};
+    }
+  }
+  for (int row = 0; row < surface.lattice.rows; ++row) {
+    for (int column = 0; column < surface.lattice.columns; ++column) {
+      const int64_t node = surface.lattice.Index(column, row);
+      if (!surface.HasPatch(node)) continue;
+      uint8_t& links = surface.links[static_cast<size_t>(node)];
+      if (column + 1 < surface.lattice.columns && surface.HasPatch(node + 1)) links |= PatchLattice::kLinkRight;
+      if (row + 1 < surface.lattice.rows && surface.HasPatch(node + surface.lattice.columns)) {
+        links |= PatchLattice::kLinkDown;
+      }
+      if (uniform(generator) < 0.2) links = 0;
+    }
+  }
+  return surface;
+}
+
+SurfaceLoader LoaderOf(const std::vector<PatchLattice>& surfaces) {
+  return [&surfaces](int i) -> absl::StatusOr<std::shared_ptr<const PatchLattice>> {
+    return std::make_shared<const PatchLattice>(surfaces[static_cast<size_t>(i)]);
+  };
+}
+
+// The definition, node against node.
+std::vector<bool> SlowAcceptance(const PatchLattice& filtered, const std::vector<PatchLattice>& supporters, int k_a) {
+  std::vector<bool> accepted(filtered.depth.size(), false);
+  for (int row = 0; row < filtered.lattice.rows; ++row) {
+    for (int column = 0; column < filtered.lattice.columns; ++column) {
+      const auto node = static_cast<size_t>(filtered.lattice.Index(column, row));
+      if (filtered.depth[node] <= 0) continue;
+      const Eigen::Vector3d x = filtered.Point(column, row);
+      int votes = 0;
+      for (const PatchLattice& supporter : supporters) {
+        const double detail = LevelOfDetail(filtered.camera, filtered.depth[node], filtered.lattice.step);
+        const double z = supporter.camera.CamFromWorld(x).z();
+        const double coarser = LevelOfDetail(supporter.camera, z, supporter.lattice.step);
+        const double radius = 3 * std::max(detail, std::min(coarser, 2 * detail));
+        if (z <= radius) continue;
+        bool near = false;
+        for (int r = 0; r < supporter.lattice.rows; ++r) {
+          for (int c = 0; c < supporter.lattice.columns; ++c) {
+            if (!supporter.HasPatch(supporter.lattice.Index(c, r))) continue;
+            near = near || (supporter.Point(c, r) - x).norm() <= radius;
+          }
+        }
+        votes += near ? 1 : 0;
+      }
+      accepted[node] = votes >= k_a;
+    }
+  }
+  return accepted;
+}
+
+TEST(Acceptance, EqualsTheDefinition) {
+  std::mt19937 generator(1);
+  ThreadPool one(1);
+  ThreadPool three(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  int64_t accepted = 0;
+  int64_t filtered_patches = 0;
+  for (int trial = 0; trial < 12; ++trial) {
+    const PatchLattice filtered =
+        RandomSurface(0, CameraAt({0, 0, 0}, 0, 40), 1 + trial % 3, trial % 2 == 0 ? 0.6 : 0.1, generator);
+    std::vector<PatchLattice> supporters;
+    for (int i = 1; i <= 4; ++i) {
+      const Camera camera = CameraAt({3 * uniform(generator), 3 * uniform(generator), 4 * uniform(generator)},
+                                     0.3 * uniform(generator), 30 + 20 * uniform(generator));
+      supporters.push_back(RandomSurface(i, camera, 1 + i % 2, 0.1, generator));
+    }
+    for (int k_a = 1; k_a <= 3; ++k_a) {
+      const std::vector<bool> expected = SlowAcceptance(filtered, supporters, k_a);
+      const auto result = AcceptSurface(filtered, 4, LoaderOf(supporters), {.k_a = k_a}, one);
+      ASSERT_TRUE(result.ok()) << result.status();
+      for (size_t node = 0; node < expected.size(); ++node) {
+        ASSERT_EQ(result->accepted.depth[node], expected[node] ? filtered.depth[node] : 0) << node;
+      }
+      EXPECT_EQ(result->patches_accepted, std::count(expected.begin(), expected.end(), true));
+      EXPECT_EQ(result->patches_filtered, filtered.CountPatches());
+      accepted += result->patches_accepted;
+      filtered_patches += result->patches_filtered;
+      std::reverse(supporters.begin(), supporters.end());
+      const auto reversed = AcceptSurface(filtered, 4, LoaderOf(supporters), {.k_a = k_a}, three);
+      EXPECT_EQ(reversed->accepted.depth, result->accepted.depth);
+      EXPECT_EQ(reversed->accepted.links, result->accepted.links);
+    }
+  }
+  EXPECT_GT(accepted, filtered_patches / 10) << "the trials must be neither trivial";
+  EXPECT_LT(accepted, filtered_patches * 9 / 10) << "nor the other";
+}
+
+TEST(Acceptance, LinksStayWhereBothEndsDo) {
+  std::mt19937 generator(2);
+  ThreadPool pool(2);
+  const PatchLattice filtered = RandomSurface(0, CameraAt({0, 0, 0}, 0, 40), 1, 0.2, generator);
+  const std::vector<PatchLattice> supporters = {RandomSurface(1, CameraAt({1, 0, 0}, 0, 40), 1, 0.1, generator)};
+  const auto result = AcceptSurface(filtered, 1, LoaderOf(supporters), {}, pool);
+  ASSERT_TRUE(result.ok());
+  const PatchLattice& accepted = result->accepted;
+  const Lattice& lattice = accepted.lattice;
+  for (int64_t node = 0; node < lattice.nodes(); ++node) {
+    const auto i = static_cast<size_t>(node);
+    uint8_t expected = 0;
+    if (accepted.HasPatch(node)) {
+      EXPECT_EQ(accepted.quality[i], filtered.quality[i]);
+      EXPECT_EQ(accepted.rgb[i], filtered.rgb[i]);
+      const bool last_column = node % lattice.columns == lattice.columns - 1;
+      if (!last_column && accepted.HasPatch(node + 1)) expected |= filtered.links[i] & PatchLattice::kLinkRight;
+      if (node + lattice.columns < lattice.nodes() && accepted.HasPatch(node + lattice.columns)) {
+        expected |= filtered.links[i] & PatchLattice::kLinkDown;
+      }
+    } else {
+      EXPECT_EQ(accepted.quality[i], 0);
+      EXPECT_TRUE(accepted.normal_in_world[i].isZero());
+    }
+    EXPECT_EQ(accepted.links[i], expected);
+  }
+}
+
+TEST(Acceptance, StopsAskingWhenAllIsDecidedAndPassesErrorsOn) {
+  std::mt19937 generator(3);
+  ThreadPool pool(1);
+  const PatchLattice filtered = RandomSurface(0, CameraAt({0, 0, 0}, 0, 40), 2, 0, generator);
+  PatchLattice same = filtered;
+  same.camera_index = 1;
+  const std::vector<PatchLattice> supporters = {same, same, same};
+  const auto result = AcceptSurface(filtered, 3, LoaderOf(supporters), {.k_a = 2}, pool);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->supporters_loaded, 2);
+  EXPECT_EQ(result->patches_accepted, result->patches_filtered);
+
+  const auto none = AcceptSurface(filtered, 0, LoaderOf(supporters), {}, pool);
+  ASSERT_TRUE(none.ok());
+  EXPECT_EQ(none->patches_accepted, 0);
+
+  const SurfaceLoader broken = [](int) { return absl::DataLossError("surface 1: truncated"); };
+  EXPECT_EQ(AcceptSurface(filtered, 1, broken, {}, pool).status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_FALSE(AcceptSurface(filtered, 1, broken, {.k_a = 0}, pool).ok());
+  EXPECT_FALSE(AcceptSurface(filtered, 1, broken, {.support_radius_steps = 0}, pool).ok());
+}
+
+TEST(Acceptance, PatchesAtOrBehindASupporterGetNoVote) {
+  std::mt19937 generator(4);
+  ThreadPool pool(1);
+  const PatchLattice filtered = RandomSurface(0, CameraAt({0, 0, 0}, 0, 40), 1, 0, generator);
+  const std::vector<PatchLattice> supporters = {RandomSurface(1, CameraAt({0, 0, 10}, 0, 40), 1, 0, generator),
+                                                RandomSurface(2, CameraAt({0, 0, 30}, 0, 40), 1, 0, generator)};
+  EXPECT_EQ(AcceptSurface(filtered, 2, LoaderOf(supporters), {}, pool)->patches_accepted, 0);
+}
+
+TEST(RemoveSmallComponents, RemovesWhatHangsTogetherTooLittle) {
+  std::mt19937 generator(5);
+  for (const int64_t min_patches : {0, 1, 2, 5, 40}) {
+    PatchLattice surface = RandomSurface(0, CameraAt({0, 0, 0}, 0, 40), 1, 0, generator);
+    for (uint8_t& links : surface.links) links = generator() % 3 == 0 ? links : 0;
+    const PatchLattice before = surface;
+    // Components by repeated relabelling.
+    const Lattice& lattice = before.lattice;
+    std::vector<int64_t> label(before.depth.size());
+    for (size_t i = 0; i < label.size(); ++i) label[i] = static_cast<int64_t>(i);
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (int64_t node = 0; node < lattice.nodes(); ++node) {
+        for (const auto& [bit, other] : {std::pair(PatchLattice::kLinkRight, node + 1),
+                                         std::pair(PatchLattice::kLinkDown, node + lattice.columns)}) {
+          if ((before.links[static_cast<size_t>(node)] & bit) == 0) continue;
+          int64_t& a = label[static_cast<size_t>(node)];
+          int64_t& b = label[static_cast<size_t>(other)];
+          if (a == b) continue;
+          a = b = std::min(a, b);
+          changed = true;
+        }
+      }
+    }
+    const int64_t removed = RemoveSmallComponents(min_patches, surface);
+    EXPECT_EQ(removed, before.CountPatches() - surface.CountPatches());
+    for (int64_t node = 0; node < lattice.nodes(); ++node) {
+      if (!before.HasPatch(node)) continue;
+      const auto size = std::count(label.begin(), label.end(), label[static_cast<size_t>(node)]);
+      EXPECT_EQ(surface.HasPatch(node), size >= min_patches);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace meshwright

@@ -1,0 +1,70 @@
+#include "coordinator/incidence/overlap_graph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <absl/strings/str_cat.h>
+
+namespace meshwright {
+namespace {
+
+constexpr int64_t kCamerasPerPiece = 16;
+
+// Whether `b` sees enough of the probes of `a` from not too different a side.
+bool SeesProbes(const CameraGeometry& a, const CameraProbes& probes_of_a, const CameraGeometry& b,
+                const CameraProbes& probes_of_b, double min_share, double cos_max_angle) {
+  const double needed = std::max(1.0, min_share * static_cast<double>(probes_of_a.in_world.size()));
+  int seen = 0;
+  for (const Eigen::Vector3d& probe : probes_of_a.in_world) {
+    if (!SeesWithinDepths(b, probes_of_b, probe)) continue;
+    if (CosApicalAngle(a, b, probe) < cos_max_angle) continue;
+    if (++seen >= needed) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+absl::Status OverlapOptions::Validate() const {
+  if (!(min_share >= 0 && min_share <= 1)) {
+    return absl::InvalidArgumentError(absl::StrCat("min_share = ", min_share, ", expected 0..1"));
+  }
+  if (!(max_angle_deg >= 0 && max_angle_deg <= 180)) {
+    return absl::InvalidArgumentError(absl::StrCat("max_angle_deg = ", max_angle_deg, ", expected 0..180"));
+  }
+  return absl::OkStatus();
+}
+
+bool OverlapGraph::Overlap(CameraIndex i, CameraIndex j) const {
+  return std::binary_search(Of(i).begin(), Of(i).end(), j);
+}
+
+OverlapGraph FindOverlaps(const std::vector<CameraGeometry>& cameras, const std::vector<CameraProbes>& probes,
+                          const IncidenceMatrix& feasible, const OverlapOptions& options, ThreadPool& pool) {
+  const double cos_max_angle = std::cos(options.max_angle_deg * std::numbers::pi / 180);
+  std::vector<std::vector<CameraIndex>> later(cameras.size());  // row i: overlapping cameras after i
+  pool.ParallelFor(static_cast<int64_t>(cameras.size()), kCamerasPerPiece, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      for (size_t j = i + 1; j < cameras.size(); ++j) {
+        const double reach = probes[i].frustum_radius + probes[j].frustum_radius;
+        const bool near_each_other =
+            (probes[i].frustum_center_in_world - probes[j].frustum_center_in_world).squaredNorm() <= reach * reach;
+        if ((near_each_other &&
+             (SeesProbes(cameras[i], probes[i], cameras[j], probes[j], options.min_share, cos_max_angle) ||
+              SeesProbes(cameras[j], probes[j], cameras[i], probes[i], options.min_share, cos_max_angle))) ||
+            feasible.Get(static_cast<CameraIndex>(i), static_cast<CameraIndex>(j))) {
+          later[i].push_back(static_cast<CameraIndex>(j));
+        }
+      }
+    }
+  });
+  std::vector<std::vector<CameraIndex>> rows(cameras.size());
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    for (const CameraIndex j : later[i]) rows[static_cast<size_t>(j)].push_back(static_cast<CameraIndex>(i));
+  }
+  for (size_t i = 0; i < cameras.size(); ++i) rows[i].insert(rows[i].end(), later[i].begin(), later[i].end());
+  return OverlapGraph(std::move(rows));
+}
+
+}  // namespace meshwright
