@@ -46,10 +46,22 @@ Stage BuildStage(const SyntheticOptions& options) {
 
 }  // namespace
 
+std::string SyntheticKindName(SyntheticKind kind) {
+  switch (kind) {
+    case SyntheticKind::kRing:
+      return "ring";
+    case SyntheticKind::kStreet:
+      return "street";
+    case SyntheticKind::kFacade:
+      break;
+  }
+  return "facade";
+}
+
 absl::StatusOr<SyntheticKind> ParseSyntheticKind(const std::string& name) {
-  if (name == "facade") return SyntheticKind::kFacade;
-  if (name == "ring") return SyntheticKind::kRing;
-  if (name == "street") return SyntheticKind::kStreet;
+  for (const SyntheticKind kind : {SyntheticKind::kFacade, SyntheticKind::kRing, SyntheticKind::kStreet}) {
+    if (name == SyntheticKindName(kind)) return kind;
+  }
   return absl::InvalidArgumentError(
       absl::StrFormat("unknown kind of synthetic scene \"%s\", expected facade, ring or street", name));
 }

@@ -22,6 +22,7 @@ enum class SyntheticKind {
 };
 
 // "facade", "ring", "street".
+std::string SyntheticKindName(SyntheticKind kind);
 absl::StatusOr<SyntheticKind> ParseSyntheticKind(const std::string& name);
 
 struct SyntheticOptions {
