@@ -44,7 +44,9 @@ void ExpectConsistent(const GridMrf& mrf, const MrfSolution& solution) {
   for (int node = 0; node < mrf.NodeCount(); ++node) EXPECT_LE(solution.labels[node], mrf.PatchCount(node));
   EXPECT_EQ(solution.energy, MrfEnergy(mrf, solution.labels));
   EXPECT_TRUE(std::isfinite(solution.energy));
-  if (solution.windows == 1) EXPECT_LE(solution.energy, mrf.NodeCount() * static_cast<double>(mrf.label0_cost) + 1e-6);
+  if (solution.windows == 1) {
+    EXPECT_LE(solution.energy, mrf.NodeCount() * static_cast<double>(mrf.label0_cost) + 1e-6);
+  }
   EXPECT_LE(solution.lower_bound, solution.energy);
 }
 
