@@ -2,11 +2,14 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <random>
+#include <string>
+#include <system_error>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 // jpeglib.h needs <cstdio> before it.
 #include <jpeglib.h>
 #include <png.h>
@@ -34,7 +37,28 @@ ColorImage Picture(int width, int height) {
   return image;
 }
 
-std::string TemporaryPath(const std::string& name) { return testing::TempDir() + "/decode_test_" + name; }
+// One for the process, so that two runs of the tests may go on at the same time.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() : path_(testing::TempDir() + "/decode_test_" + std::to_string(::getpid())) {
+    std::filesystem::create_directories(path_);
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+std::string TemporaryPath(const std::string& name) {
+  static const TemporaryFolder folder;
+  return folder.path() + "/" + name;
+}
 
 // Baseline or progressive, colour or grey, with restart markers.
 std::string OtherJpeg(const ColorImage& image, bool progressive, bool grey, unsigned restart_interval) {

@@ -13,19 +13,49 @@ constexpr int kSamplesPerSide = 96;
 
 // A rectangle of the plane z = 1.
 struct PlaneRectangle {
-  double x0 = -kLargestTangent;
-  double y0 = -kLargestTangent;
-  double x1 = kLargestTangent;
-  double y1 = kLargestTangent;
+  double x0;
+  double y0;
+  double x1;
+  double y1;
 };
 
-// Takes the part that lies between the undistorted borders of the picture. The borders are smooth, so samples tell.
+// Whether the distortion keeps its orientation near `point`: where it does not, the model has folded over.
+bool Unfolded(const Lens& lens, const Vector2d& point) {
+  constexpr double kDifference = 1e-4;
+  const Vector2d dx = lens.Distort(point + Vector2d(kDifference, 0)) - lens.Distort(point - Vector2d(kDifference, 0));
+  const Vector2d dy = lens.Distort(point + Vector2d(0, kDifference)) - lens.Distort(point - Vector2d(0, kDifference));
+  return dx.x() * dy.y() - dx.y() * dy.x() > 0;
+}
+
+bool UnfoldedUpTo(const Lens& lens, const Vector2d& point) {
+  constexpr int kSteps = 16;
+  for (int i = 1; i <= kSteps; ++i) {
+    if (!Unfolded(lens, point * (static_cast<double>(i) / kSteps))) return false;
+  }
+  return true;
+}
+
+// How far one can go from the axis in a direction of unit length.
+double UnfoldedExtent(const Lens& lens, const Vector2d& direction) {
+  constexpr int kSteps = 256;
+  int i = 0;
+  while (i < kSteps && Unfolded(lens, direction * (kLargestTangent * (i + 1) / kSteps))) ++i;
+  return kLargestTangent * i / kSteps;
+}
+
+// What lies between the undistorted borders of the picture, as far as the lens can be inverted. The borders are smooth,
+// so samples tell.
 PlaneRectangle RectangleInsideBorders(const Lens& lens) {
-  PlaneRectangle rectangle;
+  PlaneRectangle rectangle{.x0 = -UnfoldedExtent(lens, {-1, 0}),
+                           .y0 = -UnfoldedExtent(lens, {0, -1}),
+                           .x1 = UnfoldedExtent(lens, {1, 0}),
+                           .y1 = UnfoldedExtent(lens, {0, 1})};
   // Where the lens has no inverse (the direction is 90 degrees off, or the model folds over) there is no border here.
   const auto plane_from_pixel = [&](const Vector2d& pixel, auto&& use) {
     const Vector2d point = lens.PlaneFromPixel(pixel);
-    if (point.allFinite() && (lens.PixelFromPlane(point) - pixel).norm() < 1e-3) use(point);
+    if (point.allFinite() && (lens.PixelFromPlane(point) - pixel).norm() < 1e-3 && UnfoldedUpTo(lens, point)) {
+      use(point);
+    }
   };
   for (int i = 0; i <= kSamplesPerSide; ++i) {
     const double x = static_cast<double>(lens.width) * i / kSamplesPerSide;
@@ -38,26 +68,13 @@ PlaneRectangle RectangleInsideBorders(const Lens& lens) {
   return rectangle;
 }
 
-// Whether the distortion keeps its orientation near `point`: where it does not, the model has folded over.
-bool Unfolded(const Lens& lens, const Vector2d& point) {
-  constexpr double kDifference = 1e-4;
-  const Vector2d dx = lens.Distort(point + Vector2d(kDifference, 0)) - lens.Distort(point - Vector2d(kDifference, 0));
-  const Vector2d dy = lens.Distort(point + Vector2d(0, kDifference)) - lens.Distort(point - Vector2d(0, kDifference));
-  return dx.x() * dy.y() - dx.y() * dy.x() > 0;
-}
-
 // Whether a point of the rectangle's border is imaged inside the picture, and nothing folds on the way to it.
 bool IsSeen(const Lens& lens, const Vector2d& point) {
   constexpr double kTolerance = 0.25;  // px; half a pixel outside is still the outermost pixel
   const Vector2d pixel = lens.PixelFromPlane(point);
   const bool inside = pixel.x() >= -kTolerance && pixel.y() >= -kTolerance && pixel.x() <= lens.width + kTolerance &&
                       pixel.y() <= lens.height + kTolerance;
-  if (!inside) return false;  // also when not a number
-  constexpr int kSteps = 16;
-  for (int i = 1; i <= kSteps; ++i) {
-    if (!Unfolded(lens, point * (static_cast<double>(i) / kSteps))) return false;
-  }
-  return true;
+  return inside && UnfoldedUpTo(lens, point);
 }
 
 bool IsSeen(const Lens& lens, const PlaneRectangle& r) {

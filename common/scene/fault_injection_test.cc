@@ -1,0 +1,101 @@
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "common/scene/import.h"
+#include "common/scene/small_scenes.h"
+#include "common/scene/view.h"
+
+namespace meshwright {
+namespace {
+
+// Whatever happens to its files, a scene is either read or refused in one line that names a file.
+class FaultInjection : public testing::TestWithParam<SceneFiles (*)()> {
+ protected:
+  void ForEachFile(const std::function<void(const std::string& file, const std::string& bytes)>& body) {
+    const SceneFiles files = GetParam()();
+    folder_ = FreshFolder("fault");
+    WriteScene(folder_, files);
+    ASSERT_TRUE(ImportScene(folder_, std::nullopt).ok());
+    for (const auto& [file, bytes] : files) {
+      if (file.ends_with(".png")) continue;
+      body(file, bytes);
+      WriteScene(folder_, {{file, bytes}});
+    }
+  }
+
+  // Returns whether the scene could be read.
+  bool ImportDamaged(const std::string& file, const std::string& bytes) {
+    WriteScene(folder_, {{file, bytes}});
+    const absl::StatusOr<Scene> scene = ImportScene(folder_, std::nullopt);
+    if (scene.ok()) {
+      for (const SceneView& view : scene->views) {
+        EXPECT_TRUE(view.cam_from_world.translation.allFinite());
+        EXPECT_TRUE(LoadView(view, 8).ok());
+      }
+      return true;
+    }
+    const std::string message(scene.status().message());
+    EXPECT_TRUE(absl::IsInvalidArgument(scene.status()) || absl::IsNotFound(scene.status())) << scene.status();
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+    EXPECT_NE(message.find(folder_), std::string::npos) << message;
+    return false;
+  }
+
+  std::string folder_;
+};
+
+TEST_P(FaultInjection, Truncation) {
+  ForEachFile([&](const std::string& file, const std::string& bytes) {
+    const bool binary = file.ends_with(".bin");
+    for (size_t length = 0; length < bytes.size(); length += binary ? 1 : 2) {
+      const bool read = ImportDamaged(file, bytes.substr(0, length));
+      // Text may end anywhere and still make sense; a binary file may not.
+      if (binary) {
+        EXPECT_FALSE(read) << file << " cut to " << length << " bytes";
+      }
+    }
+  });
+}
+
+TEST_P(FaultInjection, FlippedBits) {
+  ForEachFile([&](const std::string& file, const std::string& bytes) {
+    for (size_t i = 0; i < bytes.size(); ++i) {
+      std::string damaged = bytes;
+      damaged[i] = static_cast<char>(damaged[i] ^ (1 << ((i * 5) % 8)));
+      ImportDamaged(file, damaged);
+    }
+  });
+}
+
+TEST_P(FaultInjection, ExtremeBytes) {
+  ForEachFile([&](const std::string& file, const std::string& bytes) {
+    for (size_t i = 0; i < bytes.size(); i += 3) {
+      std::string damaged = bytes;
+      damaged[i] = '\0';
+      ImportDamaged(file, damaged);
+      damaged[i] = '\xFF';
+      ImportDamaged(file, damaged);
+    }
+  });
+}
+
+TEST_P(FaultInjection, Noise) {
+  ForEachFile([&](const std::string& file, const std::string& bytes) {
+    uint32_t state = 1;
+    for (size_t length = 1; length < 2000; length *= 3) {
+      std::string noise;
+      for (size_t i = 0; i < length; ++i) {
+        state = state * 1664525 + 1013904223;
+        noise += static_cast<char>(state >> 24);
+      }
+      EXPECT_FALSE(ImportDamaged(file, noise)) << file;
+    }
+  });
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, FaultInjection,
+                         testing::Values(SmallColmapText, SmallColmapBinary, SmallMiddlebury, SmallStrecha));
+
+}  // namespace
+}  // namespace meshwright
