@@ -25,11 +25,18 @@ constexpr float kMinPairNcc = 0.5F;
 constexpr float kGoodPairNcc = 0.8F;
 // Matches in different targets whose depths differ by less than this in a target's image are one hypothesis.
 constexpr float kSameDepthPx = 2;
-constexpr size_t kMaxMatches = 64;    // of a corner, the best
-constexpr size_t kMaxHypotheses = 4;  // of a corner, refined
-constexpr size_t kMaxSeedsPerCorner = 3;
-constexpr int kPairReach = 1;  // px
+constexpr size_t kMaxMatches = 64;      // of a corner, the best
+constexpr size_t kMaxHypotheses = 4;    // of a corner, refined
+constexpr int kPairReach = 1;           // px
+constexpr float kPairFirstStep = 0.5F;  // px
 constexpr int kPairRounds = 2;
+constexpr int kMinContinued = 2;  // windows beside a seed's that must match too
+// A seed with so many targets and such a quality ends the search at its corner.
+constexpr int kConvincingTargets = 3;
+constexpr float kConvincingQuality = 0.85F;
+// Seeds of a corner that fall behind its best by more are left out, like patches in growing (section 3.6); so are those
+// that fewer than half as many targets see.
+constexpr float kMaxBehindBest = 0.1F;
 // A seed that one target alone confirms: what its NCC must reach, and by how much it must exceed any rival match.
 constexpr float kMinLoneNcc = 0.8F;
 constexpr float kMinLead = 0.15F;
@@ -81,18 +88,29 @@ class CornerMatcher {
     if (!window.usable) return 0;
     const std::vector<Match> matches = FindMatches(corner, window, node);
     const std::vector<Hypothesis> hypotheses = Group(corner, matches);
-    size_t kept = 0;
-    for (size_t i = 0; i < std::min(hypotheses.size(), kMaxHypotheses) && kept < kMaxSeedsPerCorner; ++i) {
+    std::vector<Seed> found;
+    int most_targets = 0;
+    float best_quality = 0;
+    for (size_t i = 0; i < std::min(hypotheses.size(), kMaxHypotheses); ++i) {
       const Match& best = hypotheses[i].best;
       const PatchObjective pair(scorer_, window, corner.x, corner.y, 1U << best.target);
       const RelativeSlope slope(best.plane.gx / best.plane.w, best.plane.gy / best.plane.w);
-      const PatchPlane plane = RefinePlane(pair, SearchDepth(pair, best.plane.w, slope, kPairReach), kPairRounds).plane;
+      const ScoredPlane in_depth = SearchDepth(pair, best.plane.w, slope, kPairReach);
+      const PatchPlane plane = RefinePlane(pair, in_depth, kPairFirstStep, kPairRounds).plane;
       Seed seed;
       const auto at_node = plane.MovedBy(static_cast<float>(node.x - corner.x), static_cast<float>(node.y - corner.y));
-      if (fitter_.Fit(node, at_node, seed) != SeedFitter::Outcome::kSeed) continue;
-      if (std::popcount(seed.sigma) == 1 && !StandsAlone(seed, hypotheses, i)) continue;
-      seeds.push_back(seed);
-      ++kept;
+      if (fitter_.Fit(node, at_node, kMinContinued, seed) != SeedFitter::Outcome::kSeed) continue;
+      const int targets = std::popcount(seed.sigma);
+      if (targets == 1 && !StandsAlone(seed, hypotheses, i)) continue;
+      found.push_back(seed);
+      most_targets = std::max(most_targets, targets);
+      best_quality = std::max(best_quality, seed.quality);
+      if (targets >= kConvincingTargets && seed.quality >= kConvincingQuality) break;
+    }
+    for (const Seed& seed : found) {
+      if (seed.quality > best_quality - kMaxBehindBest && 2 * std::popcount(seed.sigma) >= most_targets) {
+        seeds.push_back(seed);
+      }
     }
     return 0;
   }

@@ -8,9 +8,9 @@
 namespace meshwright {
 namespace {
 
-// First steps of RefinePlane, in px of the patch's image in the fastest target.
-constexpr float kDepthStep = 0.5F;
-constexpr float kSlopeStep = 0.15F;  // per px from the patch's centre
+// RefinePlane's step of slopes, per px from the patch's centre, as a share of its step of inverse depth: both move the
+// windows' borders about alike.
+constexpr float kSlopeShare = 0.3F;
 
 PatchPlane Moved(const PatchPlane& plane, int parameter, float by) {
   PatchPlane moved = plane;
@@ -72,18 +72,17 @@ ScoredPlane SearchDepth(const PatchObjective& objective, float w, const Relative
   return best;
 }
 
-ScoredPlane RefinePlane(const PatchObjective& objective, const ScoredPlane& start, int rounds) {
-  const float unit = objective.InverseDepthPerPixel(start.plane.w);
+ScoredPlane RefinePlane(const PatchObjective& objective, const ScoredPlane& start, float first_step, int rounds) {
+  float depth_step = first_step * objective.InverseDepthPerPixel(start.plane.w);
   ScoredPlane best = start;
   const auto consider = [&](const PatchPlane& plane) {
     const float score = plane.w > 0 ? objective(plane) : PatchScorer::kNoScore;
     if (score > best.score) best = {plane, score};
     return score;
   };
-  float shrink = 1;
-  for (int round = 0; round < rounds; ++round, shrink *= 0.5F) {
+  for (int round = 0; round < rounds; ++round, depth_step *= 0.5F) {
     for (const int parameter : {0, 1, 2}) {
-      const float step = shrink * unit * (parameter == 0 ? kDepthStep : kSlopeStep);
+      const float step = parameter == 0 ? depth_step : kSlopeShare * depth_step;
       const ScoredPlane middle = best;
       const float lower = consider(Moved(middle.plane, parameter, -step));
       const float upper = consider(Moved(middle.plane, parameter, step));

@@ -22,8 +22,15 @@ constexpr float kMaxResidual = 0.01F;
 constexpr float kMaxTilt = 8;
 // A slope that scores so well needs no rivals.
 constexpr float kGoodScore = 0.85F;
-constexpr int kDepthReach = 2;  // px: accuracy of sparse points' images
+// Below this, the point's image is searched further away.
+constexpr float kPoorScore = 0.6F;
+constexpr int kDepthReach = 1;  // px, and further where that finds nothing: accuracy of sparse points' images
+constexpr int kLongDepthReach = 2;
+constexpr float kFirstStep = 0.5F;  // px
 constexpr int kRefinementRounds = 2;
+constexpr int kMaxSearchTargets = 3;  // more add little to finding a plane
+// Windows beside the seed's that must match too: points are known to be matches, and may lie on thin things.
+constexpr int kMinContinued = 1;
 
 struct Projected {
   Eigen::Vector2f pixel;
@@ -65,6 +72,15 @@ std::optional<RelativeSlope> SlopeFromNeighbours(const std::vector<Projected>& p
   return slope;
 }
 
+uint32_t FirstBits(uint32_t bits, int count) {
+  uint32_t first = 0;
+  for (; count > 0 && bits != 0; --count) {
+    first |= bits & (~bits + 1);
+    bits &= bits - 1;
+  }
+  return first;
+}
+
 SeedFitter::Outcome SeedPoint(const SeedFitter& fitter, const Projected& point,
                               const std::optional<RelativeSlope>& neighbours_slope, Seed& seed) {
   const PatchScorer& scorer = fitter.scorer();
@@ -75,24 +91,30 @@ SeedFitter::Outcome SeedPoint(const SeedFitter& fitter, const Projected& point,
   if (point.w < fitter.MinInverseDepth(node.index)) return SeedFitter::Outcome::kHidden;
   const uint32_t measurable = fitter.TargetsFor(node.x, node.y, point.w);
   const uint32_t observers = measurable & point.seen_by;
-  const uint32_t targets = observers != 0 ? observers : measurable;
+  const uint32_t targets = FirstBits(observers != 0 ? observers : measurable, kMaxSearchTargets);
   if (targets == 0) return SeedFitter::Outcome::kInconsistent;
 
   const PatchObjective objective(scorer, node.window, node.x, node.y, targets);
   ScoredPlane best;
-  const auto propose = [&](const RelativeSlope& slope) {
+  const auto propose = [&](const RelativeSlope& slope, int reach) {
     const PatchPlane plane = PlaneWithSlope(point.w, slope).MovedBy(dx, dy);
     if (!(plane.w > 0)) return;
-    const ScoredPlane found = SearchDepth(objective, plane.w, RelativeSlope(plane.gx, plane.gy) / plane.w, kDepthReach);
+    const ScoredPlane found = SearchDepth(objective, plane.w, RelativeSlope(plane.gx, plane.gy) / plane.w, reach);
     if (found.score > best.score) best = found;
   };
-  propose(FacingSlope(scorer.reference(), node.x, node.y));
-  if (neighbours_slope) propose(*neighbours_slope);
+  const RelativeSlope facing = FacingSlope(scorer.reference(), node.x, node.y);
+  if (neighbours_slope) propose(*neighbours_slope, kDepthReach);
+  if (best.score < kGoodScore) propose(facing, kDepthReach);
   if (best.score < kGoodScore) {
-    for (const RelativeSlope& slope : TiltedSlopes(scorer.reference(), node.x, node.y)) propose(slope);
+    for (const RelativeSlope& slope : TiltedSlopes(scorer.reference(), node.x, node.y)) propose(slope, kDepthReach);
+  }
+  if (best.score < kPoorScore) {
+    propose(facing, kLongDepthReach);
+    if (neighbours_slope) propose(*neighbours_slope, kLongDepthReach);
   }
   if (best.score <= 0) return SeedFitter::Outcome::kInconsistent;
-  return fitter.Fit(node, RefinePlane(objective, best, kRefinementRounds).plane, seed);
+  const PatchPlane plane = RefinePlane(objective, best, kFirstStep, kRefinementRounds).plane;
+  return fitter.Fit(node, plane, kMinContinued, seed);
 }
 
 }  // namespace

@@ -1,10 +1,13 @@
 #include "worker/seeding/seed_fitter.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "common/geometry/level_of_detail.h"
 #include "worker/seeding/plane_search.h"
@@ -16,7 +19,12 @@ namespace {
 constexpr double kMaxApicalAngleDeg = 60;
 // NCC with which a target takes part in refining a seed that is not yet refined.
 constexpr float kMinRoughNcc = 0.45F;
-constexpr int kRefinementRounds = 3;
+// Refinement: first step, px, and rounds; the best few of the targets are enough.
+constexpr float kFirstStep = 0.25F;
+constexpr int kRefinementRounds = 2;
+constexpr int kMaxRefiningTargets = 4;
+// A surface goes on beyond the window: through the seed's plane, windows beside it must match too.
+constexpr float kMinContinuedNcc = 0.5F;
 // A patch this close to the accepted surface is the accepted surface (section 3.7: 3 d_r).
 constexpr float kAcceptedDistance = 3;
 // Accepted patches of neighbouring rays belong to one surface when their inverse depths differ less, relatively.
@@ -95,24 +103,53 @@ uint32_t SeedFitter::TargetsThatAgree(const Node& node, const PatchPlane& plane,
   return agreeing;
 }
 
-SeedFitter::Outcome SeedFitter::Fit(const Node& node, const PatchPlane& plane, Seed& seed) const {
+uint32_t SeedFitter::BestTargets(const Node& node, const PatchPlane& plane, uint32_t targets, float min_ncc,
+                                 int count) const {
+  std::array<std::pair<float, int>, 32> scored;
+  size_t found = 0;
+  for (int i = 0; i < scorer_.targets(); ++i) {
+    if ((targets >> i & 1U) == 0) continue;
+    const float ncc = scorer_.Score(node.window, node.x, node.y, plane, i);
+    if (ncc >= min_ncc) scored[found++] = {-ncc, i};
+  }
+  std::sort(scored.begin(), scored.begin() + static_cast<std::ptrdiff_t>(found));
+  uint32_t best = 0;
+  for (size_t k = 0; k < std::min(found, static_cast<size_t>(count)); ++k) best |= 1U << scored[k].second;
+  return best;
+}
+
+int SeedFitter::CountContinued(const Node& node, const PatchPlane& plane, uint32_t sigma) const {
+  const int shift = 2 * scorer_.options().window_radius;
+  int continued = 0;
+  PatchScorer::Window window;
+  for (const auto& [dx, dy] : {std::pair{shift, 0}, {-shift, 0}, {0, shift}, {0, -shift}}) {
+    const int x = node.x + dx;
+    const int y = node.y + dy;
+    scorer_.MakeWindow(x, y, window);
+    if (!window.usable) continue;
+    const PatchObjective objective(scorer_, window, x, y, sigma);
+    if (objective(plane.MovedBy(static_cast<float>(dx), static_cast<float>(dy))) >= kMinContinuedNcc) ++continued;
+  }
+  return continued;
+}
+
+SeedFitter::Outcome SeedFitter::Fit(const Node& node, const PatchPlane& plane, int min_continued, Seed& seed) const {
   if (!node.window.usable || !(plane.w > 0)) return Outcome::kInconsistent;
   const float min_w = MinInverseDepth(node.index);
   if (plane.w < min_w) return Outcome::kHidden;
   const uint32_t candidates = TargetsFor(node.x, node.y, plane.w);
-  float sum = 0;
-  const uint32_t rough = TargetsThatAgree(node, plane, candidates, kMinRoughNcc, sum);
+  const uint32_t rough = BestTargets(node, plane, candidates, kMinRoughNcc, kMaxRefiningTargets);
   if (rough == 0) return Outcome::kInconsistent;
-  const ScoredPlane start{plane, sum / static_cast<float>(std::popcount(rough))};
-  const ScoredPlane refined =
-      RefinePlane(PatchObjective(scorer_, node.window, node.x, node.y, rough), start, kRefinementRounds);
+  const PatchObjective objective(scorer_, node.window, node.x, node.y, rough);
+  const ScoredPlane refined = RefinePlane(objective, {plane, objective(plane)}, kFirstStep, kRefinementRounds);
   const uint32_t measurable = TargetsFor(node.x, node.y, refined.plane.w);
-  sum = 0;
+  float sum = 0;
   const uint32_t sigma = TargetsThatAgree(node, refined.plane, measurable, kMinTargetNcc, sum);
   if (sigma == 0) return Outcome::kInconsistent;
   const float quality = sum / static_cast<float>(std::popcount(sigma));
   if (quality < options_.min_quality) return Outcome::kInconsistent;
   if (refined.plane.w < min_w) return Outcome::kHidden;
+  if (CountContinued(node, refined.plane, sigma) < min_continued) return Outcome::kInconsistent;
   seed = {node.index, refined.plane, sigma, quality};
   return Outcome::kSeed;
 }

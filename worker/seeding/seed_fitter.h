@@ -54,10 +54,17 @@ class SeedFitter {
   uint32_t TargetsThatAgree(const Node& node, const PatchPlane& plane, uint32_t targets, float min_ncc,
                             float& sum) const;
 
-  // `plane`: at the node. Refines it with the targets that agree roughly and keeps those that agree well then.
-  Outcome Fit(const Node& node, const PatchPlane& plane, Seed& seed) const;
+  // The at most `count` best of them.
+  uint32_t BestTargets(const Node& node, const PatchPlane& plane, uint32_t targets, float min_ncc, int count) const;
+
+  // `plane`: at the node. Refines it with the targets that agree roughly and keeps those that agree well then. Of the
+  // four windows beside the seed's at least `min_continued` must match through its plane too: what matches by chance
+  // does not go on.
+  Outcome Fit(const Node& node, const PatchPlane& plane, int min_continued, Seed& seed) const;
 
  private:
+  int CountContinued(const Node& node, const PatchPlane& plane, uint32_t sigma) const;
+
   const PatchScorer& scorer_;
   const AcceptedDepth& accepted_;
   const Lattice& lattice_;
