@@ -134,6 +134,7 @@ TEST_P(BlobStoreConformanceTest, ThreadsAndProcessesDoNotDisturbEachOther) {
   const std::unique_ptr<BlobStore> other = harness_->OpenAgain();
   std::atomic<int> faults{0};
   std::vector<std::thread> threads;
+  threads.reserve(kThreads + 1);
   for (int t = 0; t < kThreads; ++t) {
     threads.emplace_back([&, t] {
       BlobStore& mine = t % 2 == 0 ? store() : *other;

@@ -40,7 +40,7 @@ constexpr size_t kRowsAtOnce = 1 << 14;
 
 // IEC 61966-2-1.
 std::array<uint16_t, 256> LinearFromSrgb() {
-  std::array<uint16_t, 256> table;
+  std::array<uint16_t, 256> table = {};
   for (int i = 0; i < 256; ++i) {
     const double c = i / 255.0;
     const double linear = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);

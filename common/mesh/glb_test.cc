@@ -10,7 +10,7 @@
 #include "common/base/files.h"
 #include "common/base/little_endian.h"
 #include "common/mesh/surface_union.h"
-#include "common/surface/random_surface.h"
+#include "common/surface/random_surface_testing.h"
 
 namespace meshwright {
 namespace {

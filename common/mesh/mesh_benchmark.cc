@@ -6,7 +6,7 @@
 #include "common/base/check.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/surface_union.h"
-#include "common/surface/random_surface.h"
+#include "common/surface/random_surface_testing.h"
 
 namespace meshwright {
 namespace {

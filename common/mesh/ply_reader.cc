@@ -57,8 +57,8 @@ absl::StatusOr<uint64_t> ReadListLength(const std::string& file, const Element& 
   if (!values.Next(property.count_type, length)) {
     return BadValue(file, element.name, row, property.name, values.DescribeFault());
   }
-  const auto most = static_cast<double>(values.bytes_left() / Values::SmallestSize(property.type));
-  if (!(length >= 0 && length <= most) || length != std::floor(length)) {
+  const uint64_t most = values.bytes_left() / Values::SmallestSize(property.type);
+  if (!(length >= 0 && length <= static_cast<double>(most)) || length != std::floor(length)) {
     return BadValue(file, element.name, row, property.name,
                     absl::StrCat("length of the list is ", length, ", expected an integer in 0..", most));
   }
@@ -145,7 +145,7 @@ absl::Status AppendVertex(const std::string& file, const Element& element, const
                               FiniteOrZero(value(layout.normal[2])));
   }
   if (layout.color[0] >= 0) {
-    std::array<uint8_t, 3> color;
+    std::array<uint8_t, 3> color = {0, 0, 0};
     for (int k = 0; k < 3; ++k) {
       color[k] = ColorFrom(value(layout.color[k]), element.properties[static_cast<size_t>(layout.color[k])].type);
     }

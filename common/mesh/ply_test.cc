@@ -13,6 +13,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mount.h>
 #include <unistd.h>
 
 #include "common/base/files.h"
@@ -132,6 +133,26 @@ TEST_F(PlyTest, StreamWithoutCommitLeavesNothing) {
     ASSERT_TRUE(writer->Append(RandomMesh(3, 100'000, 100'000, false)).ok());
   }
   EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(PlyTest, FullDiskIsResourceExhaustedAndLeavesNothing) {
+  const std::string small = Path("small");
+  fs::create_directory(small);
+  if (::mount("tmpfs", small.c_str(), "tmpfs", 0, "size=256k") != 0) GTEST_SKIP() << "may not mount a small disk here";
+  for (const size_t faces : {size_t{0}, size_t{200'000}}) {  // the output, or the temporary of the faces, is too large
+    const TriangleMesh mesh = RandomMesh(3, faces == 0 ? 200'000 : 10, faces, false);
+    absl::Status status = WritePly(mesh, small + "/a.ply");
+    EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
+    {
+      auto writer = PlyStreamWriter::Create(small + "/a.ply", {});
+      status = writer.ok() ? writer->Append(mesh) : writer.status();
+      if (status.ok()) status = writer->Commit();
+    }
+    EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
+    EXPECT_THAT(status.ToString(), HasSubstr(small + "/a.ply"));
+    EXPECT_TRUE(fs::is_empty(small));
+  }
+  ::umount(small.c_str());
 }
 
 TEST_F(PlyTest, StreamIntoMissingFolderIsAnErrorThatNamesTheFile) {

@@ -246,7 +246,7 @@ absl::StatusOr<PatchLattice> DecodeSurface(const std::string& bytes) {
   const auto rows = fields.Next<int32_t>();
   const auto run_count = fields.Next<uint64_t>();
   const auto patches = fields.Next<uint64_t>();
-  std::array<double, 16> numbers;
+  std::array<double, 16> numbers = {};
   for (double& number : numbers) {
     number = fields.Next<double>();
     if (!std::isfinite(number)) return Bad("a number of the camera", number, "a finite number");

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/surface/random_surface.h"
+#include "common/surface/random_surface_testing.h"
 
 namespace meshwright {
 namespace {

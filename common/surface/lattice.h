@@ -31,7 +31,7 @@ struct Lattice {
   Eigen::Vector2d Pixel(int column, int row) const { return {PixelX(column) + 0.5, PixelY(row) + 0.5}; }
   // Real-valued lattice coordinates of a pixel; the inverse of Pixel().
   Eigen::Vector2d FromPixel(const Eigen::Vector2d& pixel) const {
-    const double offset = step / 2 + 0.5;
+    const double offset = PixelX(0) + 0.5;
     return {(pixel.x() - offset) / step, (pixel.y() - offset) / step};
   }
 };

@@ -1,7 +1,7 @@
 #include <benchmark/benchmark.h>
 
 #include "common/surface/codec.h"
-#include "common/surface/random_surface.h"
+#include "common/surface/random_surface_testing.h"
 #include "common/surface/triangulation.h"
 
 namespace meshwright {

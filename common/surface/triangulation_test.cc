@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "common/surface/random_surface.h"
+#include "common/surface/random_surface_testing.h"
 
 namespace meshwright {
 namespace {
