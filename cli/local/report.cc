@@ -1,0 +1,122 @@
+#include "cli/local/report.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "common/base/status_macros.h"
+
+namespace meshwright {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double Share(int64_t part, int64_t whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+// Seconds need no more digits than microseconds.
+double Rounded(double seconds) {
+  return std::max(0.0, 1e-6 * static_cast<double>(static_cast<int64_t>(1e6 * seconds)));
+}
+
+const std::string& NameOf(const Scene& scene, CameraIndex camera) {
+  return scene.views[static_cast<size_t>(camera)].name;
+}
+
+int64_t IntegerAt(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_number_integer() ? found->get<int64_t>() : 0;
+}
+
+}  // namespace
+
+Json MakeJobReport(const Scene& scene, const CameraJobSpec& spec, const CameraJobReport& report,
+                   double seconds_loading) {
+  Json targets = Json::array();
+  for (const CameraIndex target : spec.targets) targets.push_back(NameOf(scene, target));
+  Json json;
+  json["neighbours"] = spec.neighbours.size();
+  json["targets"] = std::move(targets);
+  json["seeds"] = report.seeds;
+  json["seeds_from_points"] = report.seeds_from_points;
+  json["tentative_patches_scored"] = report.tentative_patches_scored;
+  json["patches_grown"] = report.patches_grown;
+  json["rays"] = report.rays;
+  json["rays_covered_before"] = report.rays_covered_before;
+  json["rays_grown"] = report.rays_grown;
+  json["rays_filtered"] = report.rays_filtered;
+  json["mrf_energy"] = report.mrf_energy;
+  json["mrf_lower_bound"] = report.mrf_lower_bound;
+  json["seconds"] = {{"loading", Rounded(seconds_loading)},
+                     {"visibility", Rounded(report.seconds_visibility)},
+                     {"seeding", Rounded(report.seconds_seeding)},
+                     {"growing", Rounded(report.seconds_growing)},
+                     {"filtering", Rounded(report.seconds_filtering)},
+                     {"refinement", Rounded(report.seconds_refinement)}};
+  return json;
+}
+
+absl::StatusOr<Json> MakeCamerasReport(const Scene& scene, JobStore& store, const std::string& reconstruction_id,
+                                       ReportTotals* totals) {
+  MW_ASSIGN_OR_RETURN(const std::vector<CameraJob> jobs, store.ListCameraJobs(reconstruction_id));
+  MW_ASSIGN_OR_RETURN(const std::vector<Commit> commits, store.ListCommits(reconstruction_id));
+  *totals = {};
+  Json cameras = Json::array();
+  for (size_t i = 0; i < commits.size() && i < jobs.size(); ++i) {
+    const CameraJob& job = jobs[i];
+    const Commit& commit = commits[i];
+    Json entry;
+    entry["sequence"] = commit.sequence;
+    entry["camera"] = commit.camera;
+    entry["name"] = NameOf(scene, commit.camera);
+    entry["snapshot"] = job.snapshot;
+    if (job.state == CameraJobState::kSetAside) {
+      ++totals->cameras_set_aside;
+      entry["set_aside"] = job.set_aside_reason;
+      cameras.push_back(std::move(entry));
+      continue;
+    }
+    const Json report = Json::parse(job.report_json, nullptr, false);
+    if (!report.is_object()) {
+      return absl::DataLossError("the store holds a report of a camera job that is not an object");
+    }
+    entry.update(report);
+    Json weak = Json::array();
+    for (const CameraIndex target : job.weak_targets) weak.push_back(NameOf(scene, target));
+    entry["weak_targets"] = std::move(weak);
+    entry["rays_accepted"] = commit.accepted_patches;
+    const int64_t rays = IntegerAt(report, "rays");
+    entry["shares"] = {{"covered_before", Share(IntegerAt(report, "rays_covered_before"), rays)},
+                       {"grown", Share(IntegerAt(report, "rays_grown"), rays)},
+                       {"filtered", Share(IntegerAt(report, "rays_filtered"), rays)},
+                       {"accepted", Share(commit.accepted_patches, rays)}};
+    cameras.push_back(std::move(entry));
+
+    ++totals->cameras_processed;
+    totals->rays += rays;
+    totals->rays_covered_before += IntegerAt(report, "rays_covered_before");
+    totals->rays_grown += IntegerAt(report, "rays_grown");
+    totals->rays_filtered += IntegerAt(report, "rays_filtered");
+    totals->rays_accepted += commit.accepted_patches;
+    totals->seeds += IntegerAt(report, "seeds");
+    totals->tentative_patches_scored += IntegerAt(report, "tentative_patches_scored");
+  }
+  Json json;
+  json["totals"] = {{"cameras", scene.views.size()},
+                    {"cameras_processed", totals->cameras_processed},
+                    {"cameras_set_aside", totals->cameras_set_aside},
+                    {"rays", totals->rays},
+                    {"rays_covered_before", totals->rays_covered_before},
+                    {"rays_grown", totals->rays_grown},
+                    {"rays_filtered", totals->rays_filtered},
+                    {"rays_accepted", totals->rays_accepted},
+                    {"share_covered_before", Share(totals->rays_covered_before, totals->rays)},
+                    {"share_grown", Share(totals->rays_grown, totals->rays)},
+                    {"share_accepted", Share(totals->rays_accepted, totals->rays)},
+                    {"seeds", totals->seeds},
+                    {"tentative_patches_scored", totals->tentative_patches_scored}};
+  json["cameras"] = std::move(cameras);
+  return json;
+}
+
+}  // namespace meshwright
