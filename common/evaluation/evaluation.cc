@@ -50,7 +50,7 @@ struct Counts {
 template <class T>
 double Quantile(std::vector<T> values, double share) {
   if (values.empty()) return kInfinity;
-  const auto position = static_cast<size_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  const auto position = static_cast<size_t>(std::lround(share * static_cast<double>(values.size() - 1)));
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(position), values.end());
   return values[position];
 }

@@ -10,6 +10,7 @@ namespace {
 
 TEST(PointCloudDistanceTest, AgreesWithTheDistanceToEveryPoint) {
   std::vector<Eigen::Vector3f> cloud;
+  cloud.reserve(500);
   uint32_t state = 7;
   const auto next = [&state] {
     state = state * 1664525U + 1013904223U;

@@ -132,7 +132,7 @@ MeshRayCaster& MeshRayCaster::operator=(MeshRayCaster&& other) noexcept {
 }
 
 RayHit MeshRayCaster::Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
-  RTCIntersectContext context;
+  RTCIntersectContext context{};
   rtcInitIntersectContext(&context);
   RTCRayHit query = {};
   query.ray.org_x = static_cast<float>(origin.x());
@@ -153,7 +153,7 @@ RayHit MeshRayCaster::Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d&
 
 std::array<RayHit, 4> MeshRayCaster::Cast4(const Eigen::Vector3d& origin,
                                            const std::array<Eigen::Vector3d, 4>& directions) const {
-  RTCIntersectContext context;
+  RTCIntersectContext context{};
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   alignas(16) const int valid[4] = {-1, -1, -1, -1};
@@ -183,7 +183,7 @@ std::array<RayHit, 4> MeshRayCaster::Cast4(const Eigen::Vector3d& origin,
 
 bool MeshRayCaster::IsBlocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double near,
                               double far) const {
-  RTCIntersectContext context;
+  RTCIntersectContext context{};
   rtcInitIntersectContext(&context);
   RTCRay ray = {};
   ray.org_x = static_cast<float>(origin.x());
@@ -201,7 +201,7 @@ bool MeshRayCaster::IsBlocked(const Eigen::Vector3d& origin, const Eigen::Vector
 
 uint32_t MeshRayCaster::AreBlocked4(const std::array<Eigen::Vector3d, 4>& origins, const Eigen::Vector3d& direction,
                                     double near, uint32_t active) const {
-  RTCIntersectContext context;
+  RTCIntersectContext context{};
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   alignas(16) int valid[4];
@@ -235,7 +235,7 @@ NearestSurfacePoint MeshRayCaster::Nearest(const Eigen::Vector3d& x, double radi
   // Room for the rounding of the query itself; the exact radius is tested in double.
   const double rounding = 1e-6 * x.cwiseAbs().maxCoeff();
   query.radius = std::nextafter(static_cast<float>(radius * (1 + 1e-6) + rounding), INFINITY);
-  RTCPointQueryContext context;
+  RTCPointQueryContext context{};
   rtcInitPointQueryContext(&context);
   rtcPointQuery(state_->scene, &query, &context, VisitTriangle, &nearest_query);
   return nearest_query.nearest;

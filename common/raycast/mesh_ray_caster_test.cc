@@ -74,7 +74,8 @@ TEST(MeshRayCasterTest, AgreesWithCastingAgainstEveryTriangle) {
   const Eigen::Vector3d origin(0.1, -0.2, -4);
   int hits = 0;
   for (int i = 0; i < 400; ++i) {
-    const Eigen::Vector3d direction(0.03 * (i % 20) - 0.3, 0.03 * (i / 20) - 0.3, 1);
+    const int row = i / 20;
+    const Eigen::Vector3d direction(0.03 * (i % 20) - 0.3, 0.03 * row - 0.3, 1);
     const double expected = SlowCast(mesh, origin, direction);
     const RayHit hit = caster.Cast(origin, direction);
     const RayHit in_packet = caster.Cast4(origin, {direction, direction, direction, direction})[2];
@@ -109,7 +110,9 @@ TEST(MeshRayCasterTest, NearestAgreesWithSampledTriangles) {
   const TriangleMesh mesh = RandomTriangles(20);
   const MeshRayCaster caster(mesh);
   for (int i = 0; i < 60; ++i) {
-    const Eigen::Vector3d x(0.4 * (i % 5) - 1, 0.4 * (i / 5 % 4) - 1, 0.8 * (i / 20) - 1);
+    const int row = i / 5 % 4;
+    const int layer = i / 20;
+    const Eigen::Vector3d x(0.4 * (i % 5) - 1, 0.4 * row - 1, 0.8 * layer - 1);
     const double expected = SampledNearest(mesh, x);
     const NearestSurfacePoint nearest = caster.Nearest(x, MeshRayCaster::kInfinity);
     ASSERT_TRUE(nearest.ok());

@@ -49,9 +49,8 @@ ColorImage MeshRenderer::Render(const Camera& camera, const RenderOptions& optio
   const Shading shading = Available(mesh_, options.shading);
   const Eigen::Vector3d center = camera.center_in_world();
   const Eigen::Matrix3d world_from_cam = camera.cam_from_world.rotation.transpose();
-  const Eigen::Vector3f background = ToFloat(options.background);
   const auto color_of = [&](const RayHit& hit, const Eigen::Vector3d& direction) -> Eigen::Vector3f {
-    if (!hit.ok()) return background;
+    if (!hit.ok()) return ToFloat(options.background);
     const std::array<uint32_t, 3>& face = mesh_.faces[static_cast<size_t>(hit.face)];
     const float w = 1 - hit.u - hit.v;
     if (shading == Shading::kColors) {

@@ -15,8 +15,7 @@ struct SurfaceSample {
   Eigen::Vector3f reflectance;
 };
 
-SurfaceSample Sample(const World& world, const RayHit& hit, const Eigen::Vector3d& x, const Eigen::Vector3d& direction,
-                     float footprint, uint32_t salt) {
+SurfaceSample Sample(const World& world, const RayHit& hit, const Eigen::Vector3d& x, float footprint, uint32_t salt) {
   const std::array<uint32_t, 3>& face = world.mesh.faces[static_cast<size_t>(hit.face)];
   const float w = 1 - hit.u - hit.v;
   SurfaceSample sample;
@@ -42,8 +41,10 @@ Eigen::Vector3f PixelRadiance(const World& world, const MeshRayCaster& caster, c
   std::array<Eigen::Vector3d, 4> directions;
   for (size_t i = 0; i < 4; ++i) {
     const uint64_t bits = HashBits(pixel_seed, i);
-    const double dx = 0.5 * (static_cast<double>(i % 2) + static_cast<double>(bits & 0xffffU) / 65536.0);
-    const double dy = 0.5 * (static_cast<double>(i / 2) + static_cast<double>((bits >> 16U) & 0xffffU) / 65536.0);
+    const bool right = i % 2 == 1;
+    const bool lower = i >= 2;
+    const double dx = 0.5 * ((right ? 1.0 : 0.0) + static_cast<double>(bits & 0xffffU) / 65536.0);
+    const double dy = 0.5 * ((lower ? 1.0 : 0.0) + static_cast<double>((bits >> 16U) & 0xffffU) / 65536.0);
     directions[i] = world_from_cam * camera.RayInCam(column + dx, row + dy);
   }
   const std::array<RayHit, 4> hits = caster.Cast4(center, directions);
@@ -55,7 +56,7 @@ Eigen::Vector3f PixelRadiance(const World& world, const MeshRayCaster& caster, c
     if (!hits[i].ok()) continue;
     const Eigen::Vector3d x = center + hits[i].distance * directions[i];
     const auto footprint = static_cast<float>(hits[i].distance / camera.focal());
-    samples[i] = Sample(world, hits[i], x, directions[i], footprint, salt);
+    samples[i] = Sample(world, hits[i], x, footprint, salt);
     // Shadow rays start a little off the surface.
     lifted[i] = x + 2e-4 * world.unit * samples[i].normal.cast<double>();
     if (samples[i].normal.dot(world.to_sun) > 0) lit |= 1U << i;

@@ -19,8 +19,8 @@ std::vector<ColorImage> TakePhotographs(const World& world, const MeshRayCaster&
 
 // Sparse points as structure from motion leaves them: at textured places that at least three cameras see from similar
 // directions, off by 0.3 px, some of the sightings missed.
-std::vector<SparsePoint> FindSparsePoints(const World& world, const MeshRayCaster& caster,
-                                          const std::vector<Camera>& cameras, const std::vector<ColorImage>& images,
-                                          const SyntheticOptions& options, ThreadPool& pool);
+std::vector<SparsePoint> FindSparsePoints(const MeshRayCaster& caster, const std::vector<Camera>& cameras,
+                                          const std::vector<ColorImage>& images, const SyntheticOptions& options,
+                                          ThreadPool& pool);
 
 }  // namespace meshwright

@@ -42,9 +42,9 @@ bool Sees(const MeshRayCaster& caster, const Camera& camera, const Eigen::Vector
 
 }  // namespace
 
-std::vector<SparsePoint> FindSparsePoints(const World& world, const MeshRayCaster& caster,
-                                          const std::vector<Camera>& cameras, const std::vector<ColorImage>& images,
-                                          const SyntheticOptions& options, ThreadPool& pool) {
+std::vector<SparsePoint> FindSparsePoints(const MeshRayCaster& caster, const std::vector<Camera>& cameras,
+                                          const std::vector<ColorImage>& images, const SyntheticOptions& options,
+                                          ThreadPool& pool) {
   const int per_camera = options.sparse_points_per_camera;
   const auto count = static_cast<int64_t>(cameras.size()) * per_camera;
   std::vector<SparsePoint> candidates(static_cast<size_t>(count));

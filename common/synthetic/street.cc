@@ -101,10 +101,11 @@ Stage BuildStreet(const SyntheticOptions& options) {
   stage.world.sky_high = {0.26F, 0.42F, 0.68F};
 
   for (int i = 0; i < options.cameras; ++i) {
+    const int station = i / 2;
     const double side = i % 2 == 0 ? 1 : -1;
     const double yaw = side * (kYaw + random.Uniform(-0.05, 0.05));
     const double y = 0.6 * std::sin(0.3 * i) + random.Uniform(-0.2, 0.2);
-    const Eigen::Vector3d center((i / 2) * kStationStep + random.Uniform(-0.1, 0.1), y,
+    const Eigen::Vector3d center(station * kStationStep + random.Uniform(-0.1, 0.1), y,
                                  1.65 + random.Uniform(-0.06, 0.06));
     const Eigen::Vector3d axis(std::cos(yaw), std::sin(yaw), 0.14 + random.Uniform(-0.03, 0.03));
     stage.cameras.push_back(LookAt(options, 0.72 * std::max(options.width, options.height), center, center + axis));

@@ -104,7 +104,7 @@ absl::StatusOr<SyntheticScene> MakeSyntheticScene(const SyntheticOptions& option
     view.cam_from_world = synthetic.cameras[i].cam_from_world;
     synthetic.scene.views.push_back(std::move(view));
   }
-  synthetic.scene.points = FindSparsePoints(stage.world, caster, synthetic.cameras, synthetic.images, options, pool);
+  synthetic.scene.points = FindSparsePoints(caster, synthetic.cameras, synthetic.images, options, pool);
   synthetic.ground_truth = std::move(stage.world.mesh);
   return synthetic;
 }

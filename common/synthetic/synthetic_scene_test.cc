@@ -119,7 +119,7 @@ TEST_P(EverySyntheticKind, DepthsOfDifferentViewsAgree) {
       }
     }
   }
-  EXPECT_GT(outside, 0.15 * 6 * (160 / 2) * (120 / 2));
+  EXPECT_GT(outside, 0.15 * 6 * 80 * 60);
   EXPECT_LT(static_cast<double>(inside), 0.001 * static_cast<double>(outside));
   EXPECT_GT(same, hidden);
   EXPECT_GT(hidden, 0);
