@@ -29,7 +29,8 @@ PixelIndex::PixelIndex(int width, int height, int cell_size, std::vector<Eigen::
 }
 
 int PixelIndex::CellOf(float coordinate, int cells) const {
-  const float cell = std::floor(coordinate / static_cast<float>(cell_size_));
+  // Truncation is rounding down here: negative cells become 0 either way.
+  const float cell = coordinate / static_cast<float>(cell_size_);
   return static_cast<int>(std::clamp(cell, 0.0F, static_cast<float>(cells - 1)));
 }
 
