@@ -43,7 +43,7 @@ Stage BuildFacade(const SyntheticOptions& options) {
   AddHouse(builder, front, {.width = kWidth, .balcony = true}, salt);
   AddDomes(builder, front);
   builder.AddGrid(160, 140, Material::kGround, [&](double u, double v) {
-    const Eigen::Vector3d x(-12 + 24 * u, -13 + 13.2 * v, 0);
+    const Eigen::Vector3d x(-12 + 24 * u, -13 + 14 * v, 0);
     const float bumps = FractalNoise((x / 0.6).cast<float>(), 2.0F, 0.6F, 0.15F, salt + 5);
     return Eigen::Vector3d(x.x(), x.y(), 0.03 * bumps);
   });

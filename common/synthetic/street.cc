@@ -77,8 +77,8 @@ Stage BuildStreet(const SyntheticOptions& options) {
   AddRow(builder, left, x_high - x_low, random);
   AddRow(builder, right, x_high - x_low, random);
   AddGroundStrip(builder, x_low, x_high, -3.5, 3.5, -0.13, 0.02, Material::kGround, salt);
-  AddGroundStrip(builder, x_low, x_high, 3.5, kHalfWidth + 0.5, 0, 0.003, Material::kPaving, salt + 1);
-  AddGroundStrip(builder, x_low, x_high, -kHalfWidth - 0.5, -3.5, 0, 0.003, Material::kPaving, salt + 2);
+  AddGroundStrip(builder, x_low, x_high, 3.5, kHalfWidth + 1.3, 0, 0.003, Material::kPaving, salt + 1);
+  AddGroundStrip(builder, x_low, x_high, -kHalfWidth - 1.3, -3.5, 0, 0.003, Material::kPaving, salt + 2);
   for (const SurfaceFrame& side : {left, right}) {
     // Kerb, posts and lamps stand before the houses.
     builder.AddBox(side, {0, -0.3, kHalfWidth - 3.5 - 0.01}, {x_high - x_low, 0.005, kHalfWidth - 3.5 + 0.14},
