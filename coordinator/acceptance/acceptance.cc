@@ -1,7 +1,6 @@
 #include "coordinator/acceptance/acceptance.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -18,6 +17,8 @@ namespace {
 constexpr int64_t kRowsPerPiece = 8;
 // How much coarser than the reference a supporter's own spacing may make the ball.
 constexpr double kMaxCoarseness = 2;
+// A surface this many support radii behind a patch contradicts it.
+constexpr double kClearanceInRadii = 2;
 
 // Looks for patches of one supporter near points.
 class SupportIndex {
@@ -29,6 +30,20 @@ class SupportIndex {
       ray_x_.push_back(camera.RayInCam(lattice.PixelX(column) + 0.5, 0).x());
     }
     for (int row = 0; row < lattice.rows; ++row) ray_y_.push_back(camera.RayInCam(0, lattice.PixelY(row) + 0.5).y());
+  }
+
+  // Whether the supporter looks through the point: it sees a surface more than `clearance` behind it on all four rays
+  // around it.
+  bool SeesThrough(const Eigen::Vector3d& x_in_cam, double clearance) const {
+    if (x_in_cam.z() <= clearance) return false;
+    const Lattice& lattice = surface_.lattice;
+    const Eigen::Vector2d at = lattice.FromPixel(surface_.camera.ProjectFromCam(x_in_cam));
+    if (!(at.x() >= 0 && at.y() >= 0 && at.x() < lattice.columns - 1 && at.y() < lattice.rows - 1)) return false;
+    const int64_t node = lattice.Index(static_cast<int>(at.x()), static_cast<int>(at.y()));
+    for (const int64_t corner : {node, node + 1, node + lattice.columns, node + lattice.columns + 1}) {
+      if (surface_.depth[static_cast<size_t>(corner)] < x_in_cam.z() + clearance) return false;
+    }
+    return true;
   }
 
   // Whether a patch centre lies within `radius` of the point (in the supporter's frame).
@@ -94,20 +109,26 @@ class SupportIndex {
   std::vector<double> ray_y_;  // per row
 };
 
-// Adds one supporter's votes. Gives how many patches still lack some.
-int64_t CountSupport(const PatchLattice& filtered, const PatchLattice& supporter, const AcceptanceOptions& options,
-                     std::vector<uint8_t>& votes, ThreadPool& pool) {
+// What the supporters say of one patch.
+struct Votes {
+  uint8_t support = 0;    // cameras with a patch in the ball
+  uint8_t conflicts = 0;  // cameras that look through the patch
+};
+
+uint8_t OneMore(uint8_t count) { return count < 255 ? static_cast<uint8_t>(count + 1) : count; }
+
+// Adds one supporter's votes.
+void CountVotes(const PatchLattice& filtered, const PatchLattice& supporter, const AcceptanceOptions& options,
+                std::vector<Votes>& votes, ThreadPool& pool) {
   const SupportIndex index(supporter);
   const Camera& reference = filtered.camera;
   const Rigid3 supporter_from_reference = supporter.camera.cam_from_world * Inverse(reference.cam_from_world);
   const Lattice& lattice = filtered.lattice;
-  std::atomic<int64_t> undecided = 0;
   pool.ParallelFor(lattice.rows, kRowsPerPiece, [&](int64_t begin, int64_t end) {
-    int64_t undecided_here = 0;
     for (int row = static_cast<int>(begin); row < end; ++row) {
       for (int column = 0; column < lattice.columns; ++column) {
         const auto node = static_cast<size_t>(lattice.Index(column, row));
-        if (!(filtered.depth[node] > 0) || votes[node] >= options.k_a) continue;
+        if (!(filtered.depth[node] > 0)) continue;
         const double z = filtered.depth[node];
         const Eigen::Vector3d x_in_supporter =
             supporter_from_reference *
@@ -116,13 +137,14 @@ int64_t CountSupport(const PatchLattice& filtered, const PatchLattice& supporter
         const double coarser = LevelOfDetail(supporter.camera, x_in_supporter.z(), supporter.lattice.step);
         const double radius =
             options.support_radius_steps * std::max(detail, std::min(coarser, kMaxCoarseness * detail));
-        if (index.HasPatchNear(x_in_supporter, radius)) ++votes[node];
-        undecided_here += votes[node] < options.k_a ? 1 : 0;
+        if (index.HasPatchNear(x_in_supporter, radius)) {
+          votes[node].support = OneMore(votes[node].support);
+        } else if (index.SeesThrough(x_in_supporter, kClearanceInRadii * radius)) {
+          votes[node].conflicts = OneMore(votes[node].conflicts);
+        }
       }
     }
-    undecided += undecided_here;
   });
-  return undecided;
 }
 
 void ClearNode(int64_t node, PatchLattice& surface) {
@@ -163,17 +185,17 @@ absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int
   MW_RETURN_IF_ERROR(options.Validate());
   AcceptanceResult result;
   result.patches_filtered = filtered.CountPatches();
-  std::vector<uint8_t> votes(filtered.depth.size(), 0);
-  int64_t undecided = result.patches_filtered;
-  for (int i = 0; i < supporters && undecided > 0; ++i) {
+  std::vector<Votes> votes(filtered.depth.size());
+  for (int i = 0; i < supporters && result.patches_filtered > 0; ++i) {
     MW_ASSIGN_OR_RETURN(const std::shared_ptr<const PatchLattice> supporter, load(i));
     MW_CHECK(supporter != nullptr && supporter->camera_index != filtered.camera_index);
     ++result.supporters_loaded;
-    undecided = CountSupport(filtered, *supporter, options, votes, pool);
+    CountVotes(filtered, *supporter, options, votes, pool);
   }
   result.accepted = filtered;
   for (size_t node = 0; node < votes.size(); ++node) {
-    if (votes[node] < options.k_a) ClearNode(static_cast<int64_t>(node), result.accepted);
+    const bool accepted = votes[node].support >= options.k_a && votes[node].support > votes[node].conflicts;
+    if (!accepted) ClearNode(static_cast<int64_t>(node), result.accepted);
   }
   DropDanglingLinks(result.accepted);
   result.patches_accepted = result.accepted.CountPatches();

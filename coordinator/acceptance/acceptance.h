@@ -37,8 +37,11 @@ using SurfaceLoader = std::function<absl::StatusOr<std::shared_ptr<const PatchLa
 // through it: the radius is taken with d_i instead, but at most 2 d_r, so that a far camera does not support anything
 // that lies near.
 //
-// `supporters` surfaces are asked for in order, each once, until every patch is decided; the result does not depend on
-// their order.
+// Ours: a supporter that looks through X, at a surface more than two radii behind it on all four rays around it, speaks
+// against the patch; it must have more cameras for it than against it. False surface floats in front of true surface
+// that others see, and two wrong cameras that agree by chance are outvoted.
+//
+// `supporters` surfaces are asked for in order, each once; the result does not depend on their order.
 absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int supporters, const SurfaceLoader& load,
                                                const AcceptanceOptions& options, ThreadPool& pool);
 

@@ -58,6 +58,21 @@ SurfaceLoader LoaderOf(const std::vector<PatchLattice>& surfaces) {
   };
 }
 
+// All four nodes around the point's pixel have a surface more than `clearance` behind it.
+bool LooksThrough(const PatchLattice& supporter, const Eigen::Vector3d& x, double clearance) {
+  const Eigen::Vector3d x_in_cam = supporter.camera.CamFromWorld(x);
+  if (x_in_cam.z() <= clearance) return false;
+  const Eigen::Vector2d at = supporter.lattice.FromPixel(supporter.camera.ProjectFromCam(x_in_cam));
+  const int column = static_cast<int>(std::floor(at.x()));
+  const int row = static_cast<int>(std::floor(at.y()));
+  for (const auto& [c, r] : {std::pair(0, 0), std::pair(1, 0), std::pair(0, 1), std::pair(1, 1)}) {
+    if (!supporter.lattice.Contains(column + c, row + r)) return false;
+    const float z = supporter.depth[static_cast<size_t>(supporter.lattice.Index(column + c, row + r))];
+    if (z < x_in_cam.z() + clearance) return false;
+  }
+  return true;
+}
+
 // The definition, node against node.
 std::vector<bool> SlowAcceptance(const PatchLattice& filtered, const std::vector<PatchLattice>& supporters, int k_a) {
   std::vector<bool> accepted(filtered.depth.size(), false);
@@ -67,6 +82,7 @@ std::vector<bool> SlowAcceptance(const PatchLattice& filtered, const std::vector
       if (filtered.depth[node] <= 0) continue;
       const Eigen::Vector3d x = filtered.Point(column, row);
       int votes = 0;
+      int conflicts = 0;
       for (const PatchLattice& supporter : supporters) {
         const double detail = LevelOfDetail(filtered.camera, filtered.depth[node], filtered.lattice.step);
         const double z = supporter.camera.CamFromWorld(x).z();
@@ -81,8 +97,9 @@ std::vector<bool> SlowAcceptance(const PatchLattice& filtered, const std::vector
           }
         }
         votes += near ? 1 : 0;
+        conflicts += !near && LooksThrough(supporter, x, 2 * radius) ? 1 : 0;
       }
-      accepted[node] = votes >= k_a;
+      accepted[node] = votes >= k_a && votes > conflicts;
     }
   }
   return accepted;
@@ -153,7 +170,28 @@ TEST(Acceptance, LinksStayWhereBothEndsDo) {
   }
 }
 
-TEST(Acceptance, StopsAskingWhenAllIsDecidedAndPassesErrorsOn) {
+TEST(Acceptance, WhatMoreCamerasLookThroughThanSupportIsRefused) {
+  std::mt19937 generator(6);
+  ThreadPool pool(1);
+  const Camera camera = CameraAt({0, 0, 0}, 0, 40);
+  PatchLattice wall = RandomSurface(0, camera, 1, 0, generator);
+  std::fill(wall.depth.begin(), wall.depth.end(), 10.0F);
+  PatchLattice floating = wall;
+  std::fill(floating.depth.begin(), floating.depth.end(), 5.0F);
+  const auto as_camera = [](PatchLattice surface, CameraIndex index) {
+    surface.camera_index = index;
+    return surface;
+  };
+  const std::vector<PatchLattice> one_against_one = {as_camera(floating, 1), as_camera(wall, 2)};
+  EXPECT_EQ(AcceptSurface(floating, 2, LoaderOf(one_against_one), {}, pool)->patches_accepted, 0);
+  const std::vector<PatchLattice> two_against_one = {as_camera(floating, 1), as_camera(wall, 2),
+                                                     as_camera(floating, 3)};
+  EXPECT_GT(AcceptSurface(floating, 3, LoaderOf(two_against_one), {}, pool)->patches_accepted, 0);
+  // What lies behind a supporter's surface is hidden from it: no conflict.
+  EXPECT_GT(AcceptSurface(wall, 2, LoaderOf(one_against_one), {}, pool)->patches_accepted, 0);
+}
+
+TEST(Acceptance, AsksNobodyForAnEmptySurfaceAndPassesErrorsOn) {
   std::mt19937 generator(3);
   ThreadPool pool(1);
   const PatchLattice filtered = RandomSurface(0, CameraAt({0, 0, 0}, 0, 40), 2, 0, generator);
@@ -162,8 +200,11 @@ TEST(Acceptance, StopsAskingWhenAllIsDecidedAndPassesErrorsOn) {
   const std::vector<PatchLattice> supporters = {same, same, same};
   const auto result = AcceptSurface(filtered, 3, LoaderOf(supporters), {.k_a = 2}, pool);
   ASSERT_TRUE(result.ok());
-  EXPECT_EQ(result->supporters_loaded, 2);
+  EXPECT_EQ(result->supporters_loaded, 3);
   EXPECT_EQ(result->patches_accepted, result->patches_filtered);
+  const auto of_nothing = AcceptSurface(PatchLattice::Empty(0, filtered.camera, 2), 3, LoaderOf(supporters), {}, pool);
+  ASSERT_TRUE(of_nothing.ok());
+  EXPECT_EQ(of_nothing->supporters_loaded, 0);
 
   const auto none = AcceptSurface(filtered, 0, LoaderOf(supporters), {}, pool);
   ASSERT_TRUE(none.ok());

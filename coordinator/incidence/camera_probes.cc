@@ -10,8 +10,8 @@ namespace meshwright {
 namespace {
 
 // A camera that only knows a typical depth is taken to see surface between these multiples of it.
-constexpr double kNearOfTypical = 0.4;
-constexpr double kFarOfTypical = 2.5;
+constexpr double kNearOfTypical = 1.0 / 3;
+constexpr double kFarOfTypical = 3;
 constexpr std::array<double, 4> kProbeDepthsOfTypical = {0.65, 0.87, 1.15, 1.54};
 constexpr int kRayColumns = 4;
 constexpr int kRayRows = 3;
@@ -110,7 +110,8 @@ std::vector<CameraProbes> ProbesFromPoints(const std::vector<CameraGeometry>& ca
       const Eigen::Vector2d pixel = camera.ProjectFromCam(x_in_cam);
       const int column = std::min(kProbeColumns - 1, static_cast<int>(pixel.x() * kProbeColumns / camera.width));
       const int row = std::min(kProbeRows - 1, static_cast<int>(pixel.y() * kProbeRows / camera.height));
-      bool& cell_taken = taken[static_cast<size_t>(row * kProbeColumns + column)];
+      const int cell = row * kProbeColumns + column;
+      bool& cell_taken = taken[static_cast<size_t>(cell)];
       if (cell_taken) continue;
       cell_taken = true;
       probes[i].in_world.push_back(x_in_world);

@@ -28,6 +28,12 @@ constexpr int kMaxProbes = kProbeColumns * kProbeRows;
 // known yet.
 bool SeesWithinDepths(const CameraGeometry& camera, const CameraProbes& probes, const Eigen::Vector3d& x_in_world);
 
+// Whether two cameras may see a common point at all: whether the balls around their frusta meet. Nanoseconds.
+inline bool FrustaMeet(const CameraProbes& a, const CameraProbes& b) {
+  const double reach = a.frustum_radius + b.frustum_radius;
+  return (a.frustum_center_in_world - b.frustum_center_in_world).squaredNorm() <= reach * reach;
+}
+
 // Sparse points that the cameras observed, at most one per cell of a grid over the image. Cameras that observed fewer
 // than `min_points` get probes on rays instead, at a depth borrowed from their neighbours (see below).
 std::vector<CameraProbes> ProbesFromPoints(const std::vector<CameraGeometry>& cameras,

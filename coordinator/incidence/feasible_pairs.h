@@ -41,6 +41,7 @@ struct FeasiblePairCounts {
   int64_t angle_too_small = 0;
   int64_t angle_too_large = 0;
   int64_t scale_differs = 0;
+  int64_t outside_depths = 0;
   int64_t by_frustum_overlap = 0;    // of the feasible ones: failed the axes' test, accepted by the fallback
   int64_t cameras_without_pair = 0;  // cameras that will never be processed
 };
@@ -58,11 +59,18 @@ struct FeasiblePairs {
 // two photographs from one spot, however many points they share, are not feasible. Only pairs that share a point are
 // ever looked at.
 //
-// Without sparse points, the test is done on the shortest transversal of the two optical axes, which costs about ten
-// nanoseconds for each pair of cameras. The axes of two cameras on a facade may miss each other's images although they
-// see the same wall. So a camera left with fewer than min_pairs_per_camera pairs is tested once more on probes: points
-// on a grid of its rays around the depth at which its other pairs' axes meet (or those of the cameras nearest to it);
-// see camera_probes.h. A pair is added when min_frustum_overlap of the probes lie in both images within the limits.
+// Without sparse points, the test is done on the shortest transversal of the two optical axes, which costs some ten
+// nanoseconds for each pair of cameras whose frusta come near each other and a few for the others. Two things are added
+// to the paper's test:
+// - Axes that are nearly parallel meet anywhere. So a camera's typical depth is taken from its nearest pairs, and a
+// pair
+//   counts only if its axes meet between a third and three times that depth for both cameras. Without it, a street of
+//   photographs taken sideways would pair each with those a kilometre further, whose axes it meets at the horizon.
+// - The axes of two cameras on a facade may miss each other's images although they see the same wall. So a camera left
+//   with fewer than min_pairs_per_camera pairs is tested once more on probes, points on a grid of its rays around its
+//   typical depth (if it has none, around that of the cameras nearest to it); see camera_probes.h. A pair is added when
+//   min_frustum_overlap of the probes lie in both images within the limits.
+// Cameras that all look in parallel have no transversals and no depths: they need sparse points.
 //
 // FailedPrecondition when no pair is feasible: the message counts the failed tests and names the option to change.
 absl::StatusOr<FeasiblePairs> FindFeasiblePairs(const std::vector<Camera>& cameras,

@@ -49,7 +49,7 @@ std::vector<SparsePoint> PointsSeenBy(const std::vector<Camera>& cameras, int co
 
 int64_t Sum(const FeasiblePairCounts& counts) {
   return counts.feasible + counts.few_points + counts.parallel_axes + counts.behind_camera + counts.outside_image +
-         counts.angle_too_small + counts.angle_too_large + counts.scale_differs;
+         counts.angle_too_small + counts.angle_too_large + counts.scale_differs + counts.outside_depths;
 }
 
 TEST(FeasiblePairs, OnARingTheAngleDecides) {
@@ -126,6 +126,7 @@ TEST(FeasiblePairs, SizeOfASmallBallIsItsMajorAxis) {
 TEST(FeasiblePairs, NothingFeasibleIsSaidWithCounts) {
   ThreadPool pool(1);
   std::vector<Camera> parallel;
+  parallel.reserve(4);
   for (int i = 0; i < 4; ++i) parallel.push_back(CameraLookingAt({1.0 * i, 0, 0}, {1.0 * i, 1, 0}));
   const absl::Status by_axes = FindFeasiblePairs(parallel, {}, {}, pool).status();
   EXPECT_EQ(by_axes.code(), absl::StatusCode::kFailedPrecondition);
@@ -153,6 +154,34 @@ TEST(FeasiblePairs, FrustumOverlapHelpsWhoseAxesMissEachOther) {
   ASSERT_TRUE(with.ok()) << with.status();
   EXPECT_TRUE(with->matrix.Get(0, 2));
   EXPECT_GT(with->counts.by_frustum_overlap, 0);
+}
+
+TEST(FeasiblePairs, AxesThatMeetAtTheHorizonDoNotCount) {
+  ThreadPool pool(2);
+  // A street: every metre a camera, in turn to the left, ahead and to the right of the direction to the facade. Two of
+  // them that are 100 m apart meet far behind it.
+  std::vector<Camera> cameras;
+  cameras.reserve(200);
+  for (int i = 0; i < 200; ++i) cameras.push_back(CameraLookingAt({1.0 * i, 0, 0}, {1.0 * i + (i % 3 - 1) * 4, 10, 0}));
+  const absl::StatusOr<FeasiblePairs> pairs = FindFeasiblePairs(cameras, {}, {}, pool);
+  ASSERT_TRUE(pairs.ok()) << pairs.status();
+  EXPECT_EQ(Sum(pairs->counts), 200 * 199 / 2);
+  EXPECT_GT(pairs->counts.outside_depths, 0);
+  EXPECT_EQ(pairs->counts.cameras_without_pair, 0);
+  for (CameraIndex i = 0; i < 200; ++i) {
+    for (const CameraIndex j : pairs->matrix.Neighbours(i)) EXPECT_LT(std::abs(i - j), 60);
+  }
+}
+
+TEST(FeasiblePairs, TwoCamerasKnowTheirDepth) {
+  ThreadPool pool(1);
+  const absl::StatusOr<FeasiblePairs> pairs = FindFeasiblePairs(Ring(2, 15), {}, {}, pool);
+  ASSERT_TRUE(pairs.ok()) << pairs.status();
+  for (const CameraProbes& probes : pairs->probes) {
+    EXPECT_FALSE(probes.in_world.empty());
+    EXPECT_LT(probes.near_depth, 5);
+    EXPECT_GT(probes.far_depth, 5);
+  }
 }
 
 TEST(FeasiblePairs, ThreadsDoNotMatter) {

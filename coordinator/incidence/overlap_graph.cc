@@ -47,10 +47,7 @@ OverlapGraph FindOverlaps(const std::vector<CameraGeometry>& cameras, const std:
   pool.ParallelFor(static_cast<int64_t>(cameras.size()), kCamerasPerPiece, [&](int64_t begin, int64_t end) {
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
       for (size_t j = i + 1; j < cameras.size(); ++j) {
-        const double reach = probes[i].frustum_radius + probes[j].frustum_radius;
-        const bool near_each_other =
-            (probes[i].frustum_center_in_world - probes[j].frustum_center_in_world).squaredNorm() <= reach * reach;
-        if ((near_each_other &&
+        if ((FrustaMeet(probes[i], probes[j]) &&
              (SeesProbes(cameras[i], probes[i], cameras[j], probes[j], options.min_share, cos_max_angle) ||
               SeesProbes(cameras[j], probes[j], cameras[i], probes[i], options.min_share, cos_max_angle))) ||
             feasible.Get(static_cast<CameraIndex>(i), static_cast<CameraIndex>(j))) {

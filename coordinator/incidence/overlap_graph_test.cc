@@ -1,5 +1,6 @@
 #include "coordinator/incidence/overlap_graph.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -61,6 +62,7 @@ TEST(OverlapGraph, FeasiblePairsAlwaysDo) {
 
 TEST(OverlapGraph, LongStreetsStayQuick) {
   std::vector<Camera> cameras;
+  cameras.reserve(10000);
   for (int i = 0; i < 10000; ++i) {
     cameras.push_back(CameraLookingAt({0.5 * i, 0, 0}, {0.5 * i + (i % 3 - 1) * 4, 10, 0}));
   }

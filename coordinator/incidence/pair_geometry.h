@@ -33,6 +33,7 @@ enum class PairOutcome {
   kAngleTooSmall,
   kAngleTooLarge,
   kScaleDiffers,
+  kOutsideDepths,  // the axes meet where one of the cameras is not likely to see anything
 };
 
 // Limits on what two cameras see of one point: the angle between its two rays and the ratio of its sizes.

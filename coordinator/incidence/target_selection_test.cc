@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -54,9 +55,9 @@ TEST(TargetSelection, TiesGoToTheLowestIndexWhateverTheOrderOfNeighbours) {
 
 TEST(TargetSelection, FirstOnesAreTheSameForAnyLimit) {
   std::vector<double> angles;
-  std::vector<CameraIndex> neighbours;
+  std::vector<CameraIndex> neighbours(29);
   for (int i = 0; i < 30; ++i) angles.push_back(i == 0 ? 0 : 3.0 * (i - 15) + 0.1 * i);
-  for (CameraIndex i = 1; i < 30; ++i) neighbours.push_back(i);
+  std::iota(neighbours.begin(), neighbours.end(), 1);
   const std::vector<CameraGeometry> cameras = CamerasAt(angles);
   const std::vector<CameraIndex> many = Choose(cameras, neighbours, 12);
   const std::vector<CameraIndex> few = Choose(cameras, neighbours, 5);
