@@ -32,8 +32,8 @@ GreyImage Halve(const GreyImage& grey) {
   half.grey.resize(static_cast<size_t>(half.width) * static_cast<size_t>(half.height));
   for (int y = 0; y < half.height; ++y) {
     for (int x = 0; x < half.width; ++x) {
-      const int sum = grey.At(2 * x, 2 * y) + grey.At(2 * x + 1, 2 * y) + grey.At(2 * x, 2 * y + 1) +
-                      grey.At(2 * x + 1, 2 * y + 1);
+      const int sum =
+          grey.At(2 * x, 2 * y) + grey.At(2 * x + 1, 2 * y) + grey.At(2 * x, 2 * y + 1) + grey.At(2 * x + 1, 2 * y + 1);
       half.grey[static_cast<size_t>(y) * static_cast<size_t>(half.width) + static_cast<size_t>(x)] =
           static_cast<uint8_t>((sum + 2) / 4);
     }

@@ -13,8 +13,8 @@ namespace meshwright {
 class SamplingImage {
  public:
   struct Level {
-    int width = 0;   // px
-    int height = 0;  // px
+    int width = 0;                // px
+    int height = 0;               // px
     std::vector<uint32_t> quads;  // width * height
   };
 
@@ -27,7 +27,8 @@ class SamplingImage {
   const Level& level(int i) const { return levels_[static_cast<size_t>(i)]; }
   // Grey value of a pixel of level 0.
   uint8_t At(int x, int y) const {
-    return static_cast<uint8_t>(levels_[0].quads[static_cast<size_t>(y) * static_cast<size_t>(width()) + static_cast<size_t>(x)] & 0xFFU);
+    return static_cast<uint8_t>(
+        levels_[0].quads[static_cast<size_t>(y) * static_cast<size_t>(width()) + static_cast<size_t>(x)] & 0xFFU);
   }
   int64_t bytes() const;
 

@@ -183,12 +183,14 @@ TEST(Acceptance, WhatMoreCamerasLookThroughThanSupportIsRefused) {
     return surface;
   };
   const std::vector<PatchLattice> one_against_one = {as_camera(floating, 1), as_camera(wall, 2)};
-  EXPECT_EQ(AcceptSurface(floating, 2, LoaderOf(one_against_one), {}, pool)->patches_accepted, 0);
+  // On the rim of the supporter's lattice there are not four rays around a point, so nothing speaks against it.
+  const int64_t rim = 2 * (floating.lattice.columns + floating.lattice.rows);
+  EXPECT_LE(AcceptSurface(floating, 2, LoaderOf(one_against_one), {}, pool)->patches_accepted, rim);
   const std::vector<PatchLattice> two_against_one = {as_camera(floating, 1), as_camera(wall, 2),
                                                      as_camera(floating, 3)};
-  EXPECT_GT(AcceptSurface(floating, 3, LoaderOf(two_against_one), {}, pool)->patches_accepted, 0);
+  EXPECT_GT(AcceptSurface(floating, 3, LoaderOf(two_against_one), {}, pool)->patches_accepted, rim);
   // What lies behind a supporter's surface is hidden from it: no conflict.
-  EXPECT_GT(AcceptSurface(wall, 2, LoaderOf(one_against_one), {}, pool)->patches_accepted, 0);
+  EXPECT_GT(AcceptSurface(wall, 2, LoaderOf(one_against_one), {}, pool)->patches_accepted, rim);
 }
 
 TEST(Acceptance, AsksNobodyForAnEmptySurfaceAndPassesErrorsOn) {

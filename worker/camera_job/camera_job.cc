@@ -76,8 +76,8 @@ CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions
       std::count_if(input.accepted.depth.begin(), input.accepted.depth.end(), [](float z) { return z > 0; });
 
   // Section 3.5: seeds.
-  const SeedingResult seeding = FindSeeds(scorer, ObservationsOf(input), input.accepted, input.accepted.lattice,
-                                          options.seeding, pool);
+  const SeedingResult seeding =
+      FindSeeds(scorer, ObservationsOf(input), input.accepted, input.accepted.lattice, options.seeding, pool);
   for (size_t t = 0; t < input.targets.size(); ++t) {
     if (seeding.seeds_per_target[t] < options.seeding.min_seeds_per_pair) {
       result.weak_targets.push_back(input.targets[t].camera_index);

@@ -44,36 +44,36 @@ struct JobView {
 struct CameraJobInput {
   JobView reference;
   std::shared_ptr<const ColorImage> reference_color;
-  std::vector<JobView> targets;                 // the chosen part of O_r, best first; at most kMaxTargets
-  std::vector<Eigen::Vector3d> sparse_points;   // SfM points that the reference camera saw, world frame
+  std::vector<JobView> targets;                // the chosen part of O_r, best first; at most kMaxTargets
+  std::vector<Eigen::Vector3d> sparse_points;  // SfM points that the reference camera saw, world frame
   std::vector<std::vector<CameraIndex>> sparse_points_seen_by;  // parallel to sparse_points
-  AcceptedDepth accepted;                       // V_r as of the job's snapshot
+  AcceptedDepth accepted;                                       // V_r as of the job's snapshot
 };
 
 constexpr int kMaxTargets = 16;
 
 // Counts and times of one job, for report.json and the dashboard (shares as in the paper's figure 7).
 struct CameraJobReport {
-  int64_t rays = 0;                  // lattice nodes
-  int64_t rays_covered_before = 0;   // rays with an accepted patch in V_r
+  int64_t rays = 0;                 // lattice nodes
+  int64_t rays_covered_before = 0;  // rays with an accepted patch in V_r
   int64_t seeds = 0;
   int64_t seeds_from_points = 0;
   int64_t tentative_patches_scored = 0;
   int64_t patches_grown = 0;
-  int64_t rays_grown = 0;            // rays with at least one grown patch
-  int64_t rays_filtered = 0;         // rays with a patch in F_r
+  int64_t rays_grown = 0;     // rays with at least one grown patch
+  int64_t rays_filtered = 0;  // rays with a patch in F_r
   double mrf_energy = 0;
   double mrf_lower_bound = 0;
-  double seconds_visibility = 0;     // filled in by whoever makes V_r
-  double seconds_seeding = 0;        // wall
+  double seconds_visibility = 0;  // filled in by whoever makes V_r
+  double seconds_seeding = 0;     // wall
   double seconds_growing = 0;
   double seconds_filtering = 0;
   double seconds_refinement = 0;
 };
 
 struct CameraJobResult {
-  PatchLattice filtered;                    // F_r
-  std::vector<CameraIndex> weak_targets;    // pairs (r, t) with fewer than m_S seeds, to be removed from CI
+  PatchLattice filtered;                  // F_r
+  std::vector<CameraIndex> weak_targets;  // pairs (r, t) with fewer than m_S seeds, to be removed from CI
   CameraJobReport report;
 };
 

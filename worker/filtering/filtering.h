@@ -16,10 +16,10 @@ namespace meshwright {
 
 // Section 3.7 of Jancosek et al. 2009, "MRF filtering".
 struct FilteringOptions {
-  double no_patch_cost = 1;          // c0, cost of label 0, >= 0
-  double boundary_cost = 1;          // e0, cost of a patch beside a ray without one, >= 0
+  double no_patch_cost = 1;             // c0, cost of label 0, >= 0
+  double boundary_cost = 1;             // e0, cost of a patch beside a ray without one, >= 0
   double max_plane_distance_steps = 2;  // delta = distance from each other's plane / (this * d_r), at most 1; > 0
-  double max_normal_angle_deg = 60;  // neighbouring normals differ by less, degrees, 0..180
+  double max_normal_angle_deg = 60;     // neighbouring normals differ by less, degrees, 0..180
   TrwsOptions trws;
   RefinementOptions refinement;
 

@@ -41,8 +41,8 @@ uint32_t SelectViews(const PatchScorer& scorer, const PatchScorer::Window& windo
     scores.ncc[static_cast<size_t>(target)] = scorer.Score(window, x, y, plane, target);
     best = std::max(best, scores.ncc[static_cast<size_t>(target)]);
   }
-  const float threshold = std::max(static_cast<float>(options.min_view_quality),
-                                   best - static_cast<float>(options.max_view_deficit));
+  const float threshold =
+      std::max(static_cast<float>(options.min_view_quality), best - static_cast<float>(options.max_view_deficit));
   uint32_t sigma = 0;
   for (int target = 0; target < scorer.targets(); ++target) {
     if (scores.ncc[static_cast<size_t>(target)] >= threshold) sigma |= uint32_t{1} << target;
@@ -163,8 +163,8 @@ int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& option
     const std::vector<PatchPlane> refined = surface.plane;
     over_rows([&](int column, int row) {
       const auto node = static_cast<size_t>(lattice.Index(column, row));
-      const float reach = 3 * refined[node].w * static_cast<float>(lattice.step) /
-                          static_cast<float>(scorer.reference().focal());
+      const float reach =
+          3 * refined[node].w * static_cast<float>(lattice.step) / static_cast<float>(scorer.reference().focal());
       surface.plane[node] = FitToNeighbours(surface, refined, column, row, options.slope_radius_steps, reach);
     });
     step_px *= 0.5F;

@@ -10,14 +10,14 @@
 
 namespace meshwright {
 
-// Photometric refinement of the patches that the MRF chose. The paper stops at steps of d_r along the ray; here depth is
-// moved to the peak of photo-consistency, and normals follow the refined neighbours.
+// Photometric refinement of the patches that the MRF chose. The paper stops at steps of d_r along the ray; here depth
+// is moved to the peak of photo-consistency, and normals follow the refined neighbours.
 struct RefinementOptions {
-  int rounds = 2;                    // 0 leaves the patches as they are, 0..8
-  double first_step_px = 0.5;        // movement in the target with the widest baseline that the first round tries, px, > 0
-  double min_view_quality = 0.5;     // a target below this NCC does not vote, -1..1
-  double max_view_deficit = 0.25;    // nor one this much below the best target, 0..2
-  int slope_radius_steps = 2;        // normals from linked neighbours this near, lattice steps, 1..8
+  int rounds = 2;                 // 0 leaves the patches as they are, 0..8
+  double first_step_px = 0.5;     // movement in the target with the widest baseline that the first round tries, px, > 0
+  double min_view_quality = 0.5;  // a target below this NCC does not vote, -1..1
+  double max_view_deficit = 0.25;  // nor one this much below the best target, 0..2
+  int slope_radius_steps = 2;      // normals from linked neighbours this near, lattice steps, 1..8
 
   absl::Status Validate() const;
 };

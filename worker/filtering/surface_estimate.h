@@ -9,8 +9,8 @@
 
 namespace meshwright {
 
-// The surface of one reference camera while it is worked on: at most one patch per ray, in the reference camera's terms.
-// Dense arrays over lattice.nodes().
+// The surface of one reference camera while it is worked on: at most one patch per ray, in the reference camera's
+// terms. Dense arrays over lattice.nodes().
 struct SurfaceEstimate {
   Lattice lattice;
   std::vector<PatchPlane> plane;  // w = 0: no patch on this ray

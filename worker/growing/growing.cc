@@ -73,8 +73,8 @@ class Grower {
     }
   }
 
-  // The 3 x 4 tentative patches of section 3.6: on each of the four neighbouring rays the patch of best quality among the
-  // intersection with p's plane and one step before and behind. Reads the stacks, changes nothing. Returns how many
+  // The 3 x 4 tentative patches of section 3.6: on each of the four neighbouring rays the patch of best quality among
+  // the intersection with p's plane and one step before and behind. Reads the stacks, changes nothing. Returns how many
   // tentative patches were scored.
   int64_t Expand(const GrownPatch& p, std::array<Candidate, 4>& candidates) const {
     int64_t scored = 0;
@@ -90,8 +90,8 @@ class Grower {
       const int next_row = row + kNeighbours[j][1];
       if (!lattice.Contains(next_column, next_row)) continue;
       const auto node = static_cast<int32_t>(lattice.Index(next_column, next_row));
-      const PatchPlane on_plane =
-          p.plane.MovedBy(static_cast<float>(kNeighbours[j][0] * lattice.step), static_cast<float>(kNeighbours[j][1] * lattice.step));
+      const PatchPlane on_plane = p.plane.MovedBy(static_cast<float>(kNeighbours[j][0] * lattice.step),
+                                                  static_cast<float>(kNeighbours[j][1] * lattice.step));
       if (!(on_plane.w > 0) || !MayGrowAt(node, p.seed, on_plane.w)) continue;
       if (IsBehindAccepted(node, on_plane.w)) continue;
       const int x = lattice.PixelX(next_column);
@@ -182,9 +182,9 @@ class Grower {
     stacks_.patches.push_back(patch);
   }
 
-  // Normals: the least-squares plane through centres grown from the same seed. The plane is fitted in inverse depth over
-  // pixels, where it is affine; p's own slope takes part as a weak prior, so that few or collinear neighbours are no
-  // special case.
+  // Normals: the least-squares plane through centres grown from the same seed. The plane is fitted in inverse depth
+  // over pixels, where it is affine; p's own slope takes part as a weak prior, so that few or collinear neighbours are
+  // no special case.
   PatchPlane FitSlope(const GrownPatch& p, int column, int row) const {
     const Lattice& lattice = stacks_.lattice;
     const float reach = static_cast<float>(options_.normal_radius_steps) *

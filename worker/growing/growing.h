@@ -15,29 +15,29 @@ namespace meshwright {
 
 // Section 3.6 of Jancosek et al. 2009.
 struct GrowingOptions {
-  double min_quality = 0.6;            // condition (2): q of a grown patch, -1..1
-  double max_quality_deficit = 0.1;    // condition (2): q may be this much below the best on its ray, 0..2
-  int max_patches_per_ray = 10;        // condition (5), 1..32
-  double normal_radius_steps = 10;     // normals from patches of the same seed this near, lattice steps, 1..16
+  double min_quality = 0.6;          // condition (2): q of a grown patch, -1..1
+  double max_quality_deficit = 0.1;  // condition (2): q may be this much below the best on its ray, 0..2
+  int max_patches_per_ray = 10;      // condition (5), 1..32
+  double normal_radius_steps = 10;   // normals from patches of the same seed this near, lattice steps, 1..16
 
   absl::Status Validate() const;
 };
 
 // A patch on a ray of the reference lattice: p = (X, n, r, Sigma) with the bookkeeping of growing.
 struct GrownPatch {
-  PatchPlane plane;      // inverse depth on the node's ray and its slope (the normal)
-  float quality = 0;     // q(p), mean NCC over sigma
-  uint32_t sigma = 0;    // Sigma: bit i = target i
-  int32_t seed = 0;      // which seed it grew from
-  int32_t node = 0;      // lattice index
-  int32_t next = -1;     // next patch on the same ray, -1 at the end
+  PatchPlane plane;    // inverse depth on the node's ray and its slope (the normal)
+  float quality = 0;   // q(p), mean NCC over sigma
+  uint32_t sigma = 0;  // Sigma: bit i = target i
+  int32_t seed = 0;    // which seed it grew from
+  int32_t node = 0;    // lattice index
+  int32_t next = -1;   // next patch on the same ray, -1 at the end
 };
 
 // G_r: the stack of grown patches on every ray.
 struct PatchStacks {
   Lattice lattice;
-  std::vector<int32_t> first;        // per node: index into `patches`, -1 for none
-  std::vector<GrownPatch> patches;   // in order of insertion
+  std::vector<int32_t> first;       // per node: index into `patches`, -1 for none
+  std::vector<GrownPatch> patches;  // in order of insertion
   int64_t tentative_patches_scored = 0;
 
   int64_t CountRays() const;

@@ -8,8 +8,8 @@
 
 namespace meshwright {
 
-// Q_open of section 3.6: patches waiting to be expanded, best quality first. Qualities are sorted into buckets of 1/256;
-// within a bucket the latest comes first, which keeps neighbouring patches together in memory.
+// Q_open of section 3.6: patches waiting to be expanded, best quality first. Qualities are sorted into buckets of
+// 1/256; within a bucket the latest comes first, which keeps neighbouring patches together in memory.
 class OpenQueue {
  public:
   void Push(int32_t patch, float quality) {

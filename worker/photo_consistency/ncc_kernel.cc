@@ -50,8 +50,8 @@ float NccImplementation(const NccInput& input) {
       const auto row = hn::ConvertTo(i32, y);
       const F fraction_x = hn::Sub(x, hn::ConvertTo(f32, column));
       const F fraction_y = hn::Sub(y, hn::ConvertTo(f32, row));
-      const auto quad = hn::GatherIndex(i32, reinterpret_cast<const int32_t*>(input.quads),
-                                        hn::Add(hn::Mul(row, stride), column));
+      const auto quad =
+          hn::GatherIndex(i32, reinterpret_cast<const int32_t*>(input.quads), hn::Add(hn::Mul(row, stride), column));
       const F top_left = hn::ConvertTo(f32, hn::And(quad, low_byte));
       const F top_right = hn::ConvertTo(f32, hn::And(hn::ShiftRight<8>(quad), low_byte));
       const F bottom_left = hn::ConvertTo(f32, hn::And(hn::ShiftRight<16>(quad), low_byte));

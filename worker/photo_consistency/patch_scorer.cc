@@ -82,8 +82,8 @@ void PatchScorer::MakeWindow(int x, int y, Window& window) const {
   int sum_of_squares = 0;
   int k = 0;
   for (int row = y - radius; row <= y + radius; ++row) {
-    const uint32_t* quads = &level.quads[static_cast<size_t>(row) * static_cast<size_t>(level.width) +
-                                         static_cast<size_t>(x - radius)];
+    const uint32_t* quads =
+        &level.quads[static_cast<size_t>(row) * static_cast<size_t>(level.width) + static_cast<size_t>(x - radius)];
     for (int column = 0; column <= 2 * radius; ++column) {
       const int value = static_cast<int>(quads[column] & 0xFFU);
       sum += value;
@@ -116,8 +116,8 @@ float PatchScorer::Score(const Window& window, int x, int y, const PatchPlane& p
     input.col1[i] = geometry.a(i, 1) + geometry.b(i) * plane.gy;
   }
   const auto radius = static_cast<float>(options_.window_radius);
-  // The plane must lie in front of both cameras over the whole window: third coordinate and inverse depth are affine, so
-  // their smallest values lie in corners.
+  // The plane must lie in front of both cameras over the whole window: third coordinate and inverse depth are affine,
+  // so their smallest values lie in corners.
   const float min_third = input.c[2] - radius * (std::fabs(input.col0[2]) + std::fabs(input.col1[2]));
   const float min_inverse_depth = plane.w - radius * (std::fabs(plane.gx) + std::fabs(plane.gy));
   if (!(min_third > 0) || !(min_inverse_depth > 0)) return kNoScore;

@@ -41,8 +41,8 @@ class PatchScorer {
   static constexpr float kNoScore = -2.0F;
 
   struct Options {
-    int window_radius = 3;              // s, px: (2 s + 1)^2 pixels, 1..7 (section 3.6: 2 or 3)
-    double min_texture_sigma = 1.0;     // standard deviation of the reference window, grey levels, >= 0
+    int window_radius = 3;           // s, px: (2 s + 1)^2 pixels, 1..7 (section 3.6: 2 or 3)
+    double min_texture_sigma = 0.5;     // standard deviation of the reference window, grey levels, >= 0
   };
 
   PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options);
@@ -56,9 +56,9 @@ class PatchScorer {
 
   // The reference window around integer pixel (x, y), made once and compared many times.
   struct Window {
-    float values[232];      // (grey - mean) / (samples * sigma); padded with zeros to whole groups
-    float sigma = 0;                // grey levels
-    bool usable = false;            // inside the image and textured
+    float values[232];    // (grey - mean) / (samples * sigma); padded with zeros to whole groups
+    float sigma = 0;      // grey levels
+    bool usable = false;  // inside the image and textured
   };
   void MakeWindow(int x, int y, Window& window) const;
 

@@ -51,8 +51,9 @@ double Bilinear(const GreyImage& image, double x, double y) {
 }
 
 // The definition, written down in double precision: every pixel of the window goes to the plane and into the target.
-std::optional<double> SlowScore(const GreyImage& reference_image, const Camera& reference, const GreyImage& target_image,
-                                const Camera& target, int x, int y, const PatchPlane& plane, int radius) {
+std::optional<double> SlowScore(const GreyImage& reference_image, const Camera& reference,
+                                const GreyImage& target_image, const Camera& target, int x, int y,
+                                const PatchPlane& plane, int radius) {
   std::vector<double> r;
   std::vector<double> t;
   for (int dy = -radius; dy <= radius; ++dy) {
@@ -107,7 +108,8 @@ TEST(PatchScorer, EqualsItsDefinition) {
     for (int i = 0; i < 300; ++i) {
       const int x = static_cast<int>(generator() % 120);
       const int y = static_cast<int>(generator() % 100);
-      const PatchPlane plane{0.4F + 0.2F * uniform(generator), 0.004F * uniform(generator), 0.004F * uniform(generator)};
+      const PatchPlane plane{0.4F + 0.2F * uniform(generator), 0.004F * uniform(generator),
+                             0.004F * uniform(generator)};
       PatchScorer::Window window;
       scorer.MakeWindow(x, y, window);
       const float fast = scorer.Score(window, x, y, plane, 0);
@@ -145,7 +147,8 @@ TEST(PatchScorer, EveryInstructionSetGivesTheSameBits) {
     for (int i = 0; i < 200; ++i) {
       PatchScorer::Window window;
       scorer.MakeWindow(20 + i % 80, 20 + i % 60, window);
-      const float score = scorer.Score(window, 20 + i % 80, 20 + i % 60, {0.4F, 0.0001F * static_cast<float>(i), 0.001F}, 0);
+      const float score =
+          scorer.Score(window, 20 + i % 80, 20 + i % 60, {0.4F, 0.0001F * static_cast<float>(i), 0.001F}, 0);
       uint32_t bits = 0;
       std::memcpy(&bits, &score, sizeof(bits));
       bits_of_all = bits_of_all * 31 + bits;
