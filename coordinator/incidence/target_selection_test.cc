@@ -55,6 +55,7 @@ TEST(TargetSelection, TiesGoToTheLowestIndexWhateverTheOrderOfNeighbours) {
 
 TEST(TargetSelection, FirstOnesAreTheSameForAnyLimit) {
   std::vector<double> angles;
+  angles.reserve(30);
   std::vector<CameraIndex> neighbours(29);
   for (int i = 0; i < 30; ++i) angles.push_back(i == 0 ? 0 : 3.0 * (i - 15) + 0.1 * i);
   std::iota(neighbours.begin(), neighbours.end(), 1);
