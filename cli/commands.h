@@ -1,0 +1,38 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <absl/status/statusor.h>
+
+#include "cli/console.h"
+#include "common/scene/scene.h"
+
+namespace meshwright {
+
+// Each adds one subcommand to the program. What it is to do is put into `run`, which returns the exit code, when the
+// user chose it.
+using Run = std::function<int()>;
+void AddReconstructCommand(CLI::App& program, Run& run);
+void AddInspectCommand(CLI::App& program, Run& run);
+void AddEvaluateCommand(CLI::App& program, Run& run);
+void AddSynthesizeCommand(CLI::App& program, Run& run);
+void AddRenderCommand(CLI::App& program, Run& run);
+
+// Options that several commands share.
+struct SceneArguments {
+  std::string path;
+  std::optional<std::string> format;
+};
+void AddFormatOption(CLI::App& command, SceneArguments& scene);
+void AddOutputOptions(CLI::App& command, OutputSettings& output);
+void AddThreadsOption(CLI::App& command, int& threads);
+
+// Cores that this process may use.
+int AvailableCores();
+// Errors are bad input.
+absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments);
+
+}  // namespace meshwright

@@ -1,0 +1,61 @@
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+
+#include "cli/commands.h"
+#include "cli/local/failure.h"
+#include "cli/local/inspection.h"
+#include "cli/local/reconstruction_options.h"
+#include "common/base/thread_pool.h"
+
+namespace meshwright {
+namespace {
+
+constexpr char kExamples[] = R"(Examples:
+  meshwright inspect scene
+  meshwright inspect scene --max-image-size 1536 --threads 8 --json
+Takes the options of reconstruct that matter before any work is done.)";
+
+struct Arguments {
+  SceneArguments scene;
+  ReconstructionOptions options;
+  int threads = AvailableCores();
+  OutputSettings output;
+};
+
+int RunCommand(const Arguments& arguments) {
+  if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
+    return FailWrongUse(std::string(valid.message()));
+  }
+  const absl::StatusOr<Scene> scene = LoadScene(arguments.scene);
+  if (!scene.ok()) return Fail(scene.status());
+  ThreadPool pool(arguments.threads);
+  const absl::StatusOr<Inspection> inspection = Inspect(*scene, arguments.options, pool);
+  if (!inspection.ok()) return Fail(inspection.status());
+  if (arguments.output.json) {
+    PrintJson(ToJson(*inspection));
+  } else {
+    std::fputs(ToText(*inspection).c_str(), stdout);
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void AddInspectCommand(CLI::App& program, Run& run) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("inspect", "Say what a scene is and what its reconstruction will take");
+  command.footer(kExamples);
+  command.add_option("SCENE", arguments->scene.path, "folder with cameras and photographs")->required();
+  AddFormatOption(command, arguments->scene);
+  AddThreadsOption(command, arguments->threads);
+  AddOutputOptions(command, arguments->output);
+  VisitOptions(arguments->options, [&](const char* group, const char* name, auto& field, const char* help) {
+    command.add_option(absl::StrCat("--", name), field, help)->group(group)->capture_default_str();
+  });
+  command.callback([arguments, &run] { run = [arguments] { return RunCommand(*arguments); }; });
+}
+
+}  // namespace meshwright

@@ -1,0 +1,52 @@
+#include <cstdio>
+#include <new>
+
+#include <CLI/CLI.hpp>
+#include <absl/strings/str_cat.h>
+#include <malloc.h>
+
+#include "cli/commands.h"
+#include "cli/console.h"
+
+namespace {
+
+// Lattices and images are tens of megabytes each. The allocator would keep freed ones for later, after a while, and
+// memory would be that of the largest job times the number of threads; so large blocks always go back to the system.
+void KeepMemoryLow() {
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  mallopt(M_TRIM_THRESHOLD, 8 << 20);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace meshwright;
+  KeepMemoryLow();
+  CLI::App program(
+      "Meshwright turns photographs with known cameras into a triangle mesh (Jancosek, Shekhovtsov, "
+      "Pajdla: Scalable Multi-View Stereo, 2009).",
+      "meshwright");
+  program.set_version_flag("--version", absl::StrCat("meshwright ", MW_VERSION));
+  program.require_subcommand(1);
+  program.footer(
+      "meshwright COMMAND --help shows a command's options and examples.\n"
+      "Exit codes: 0 done, 1 failed, 2 wrong use, 3 bad input.");
+  Run run;
+  AddReconstructCommand(program, run);
+  AddInspectCommand(program, run);
+  AddEvaluateCommand(program, run);
+  AddSynthesizeCommand(program, run);
+  AddRenderCommand(program, run);
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
+    return FailWrongUse(absl::StrCat(error.what(), " (--help shows what is expected)"));
+  }
+  try {
+    return run();
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "meshwright: out of memory\n");
+    return kExitFailed;
+  }
+}

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdio>
+#include <deque>
+#include <string>
+#include <utility>
+
+#include <absl/time/time.h>
+
+#include "cli/local/local_reconstruction.h"
+#include "common/base/clock.h"
+
+namespace meshwright {
+
+// Shows how far a reconstruction is: one line that is drawn again and again on a terminal, plain lines elsewhere.
+class ProgressDisplay {
+ public:
+  enum class Style { kNone, kBar, kLines };
+  static Style StyleFor(std::FILE* stream, bool quiet);
+
+  // `stream` and `clock` outlive the display.
+  ProgressDisplay(Style style, std::FILE* stream, const Clock& clock);
+  ~ProgressDisplay();
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  void Show(const LocalProgress& progress);
+  // Ends the line that is being drawn; call before anything else is printed.
+  void End();
+
+ private:
+  void ShowBar(const LocalProgress& progress);
+  void ShowLine(const LocalProgress& progress);
+  // From the speed of the last few cameras: later cameras are quicker, they find more that is accepted already.
+  std::string Remaining(const LocalProgress& progress) const;
+
+  const Style style_;
+  std::FILE* const stream_;
+  const Clock& clock_;
+  bool drawn_ = false;
+  int stage_ = -1;
+  int last_line_done_ = -1;
+  std::deque<std::pair<int, absl::Time>> recent_;  // (cameras done, when)
+};
+
+}  // namespace meshwright

@@ -1,0 +1,129 @@
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+
+#include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include "cli/commands.h"
+#include "cli/local/failure.h"
+#include "cli/local/local_reconstruction.h"
+#include "cli/progress_display.h"
+#include "common/base/clock.h"
+#include "common/base/status_macros.h"
+
+namespace meshwright {
+namespace {
+
+constexpr char kExamples[] = R"(Examples:
+  meshwright reconstruct scene -o mesh.ply
+  meshwright reconstruct fountain-P11 -o fountain.ply --max-image-size 1536
+  meshwright reconstruct temple -o temple.ply --lattice-step 1 --support 2 --parts
+Stopped or killed, the same command goes on from the last camera and ends with the same bytes.)";
+
+struct Arguments {
+  SceneArguments scene;
+  ReconstructionOptions options;
+  LocalSettings settings;
+  bool parts = false;
+  int64_t memory_mib = 0;  // 0: by the number of threads
+  OutputSettings output;
+};
+
+// State is safe at any moment, so stopping needs no clean-up: it only says how to go on.
+extern "C" void OnStopSignal(int signal) {
+  static const char message[] = "\nmeshwright: stopped; the same command goes on from the last camera\n";
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, message, sizeof(message) - 1);
+  ::_exit(128 + signal);
+}
+
+// out/mesh.ply -> out/mesh + suffix.
+std::string BesideOutput(const std::string& output_path, const std::string& suffix) {
+  return std::filesystem::path(output_path).replace_extension().string() + suffix;
+}
+
+// About half a GiB for each core, 1 GiB at least.
+int64_t DefaultMemoryMib(int threads) { return std::max<int64_t>(1024, int64_t{512} * threads); }
+
+void PrintSummary(const nlohmann::ordered_json& report, const LocalSettings& settings) {
+  const auto& totals = report["totals"];
+  const auto& process = report["process"];
+  const auto percent = [](const nlohmann::ordered_json& share) { return 100 * share.get<double>(); };
+  std::printf("mesh     %s: %s vertices, %s faces\n", settings.output_path.c_str(),
+              FormatCount(report["mesh"]["vertices"].get<int64_t>()).c_str(),
+              FormatCount(report["mesh"]["faces"].get<int64_t>()).c_str());
+  std::printf("report   %s\n", settings.report_path.c_str());
+  std::printf("cameras  %d processed; of their rays %.1f%% covered before, %.1f%% grown, %.1f%% accepted\n",
+              totals["cameras_processed"].get<int>(), percent(totals["share_covered_before"]),
+              percent(totals["share_grown"]), percent(totals["share_accepted"]));
+  std::printf("took     %s (%s of CPU), %s of memory at most\n",
+              FormatDuration(process["wall_seconds"].get<double>()).c_str(),
+              FormatDuration(process["cpu_seconds"].get<double>()).c_str(),
+              FormatBytes(process["peak_memory_bytes"].get<double>()).c_str());
+}
+
+int Reconstruct(Arguments& arguments) {
+  LocalSettings& settings = arguments.settings;
+  if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
+    return FailWrongUse(std::string(valid.message()));
+  }
+  settings.report_path = BesideOutput(settings.output_path, ".report.json");
+  if (settings.work_folder.empty()) settings.work_folder = settings.output_path + ".work";
+  if (arguments.parts) settings.parts_folder = BesideOutput(settings.output_path, ".parts");
+  const int64_t mebibytes = arguments.memory_mib > 0 ? arguments.memory_mib : DefaultMemoryMib(settings.threads);
+  settings.memory_limit_bytes = mebibytes << 20;
+
+  const absl::StatusOr<Scene> scene = LoadScene(arguments.scene);
+  if (!scene.ok()) return Fail(scene.status());
+  std::signal(SIGINT, OnStopSignal);
+  std::signal(SIGTERM, OnStopSignal);
+  const RealClock clock;
+  ProgressDisplay display(ProgressDisplay::StyleFor(stderr, arguments.output.quiet), stderr, clock);
+  const CameraJobFunction job = [&](const CameraJobInput& input, ThreadPool& pool) {
+    return RunCameraJob(input, arguments.options.job, pool);
+  };
+  absl::StatusOr<nlohmann::ordered_json> report = ReconstructLocally(
+      *scene, arguments.options, settings, job, [&](const LocalProgress& progress) { display.Show(progress); });
+  display.End();
+  if (!report.ok()) return Fail(report.status());
+  if (arguments.output.json) {
+    report->erase("cameras");
+    (*report)["report"] = settings.report_path;
+    PrintJson(*report);
+  } else {
+    PrintSummary(*report, settings);
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void AddReconstructCommand(CLI::App& program, Run& run) {
+  auto arguments = std::make_shared<Arguments>();
+  arguments->settings.threads = AvailableCores();
+  CLI::App& command = *program.add_subcommand("reconstruct", "Turn photographs with known cameras into a mesh");
+  command.footer(kExamples);
+  command.add_option("SCENE", arguments->scene.path, "folder with cameras and photographs")->required();
+  command.add_option("-o,--output", arguments->settings.output_path, "the mesh to write, PLY")->required();
+  AddFormatOption(command, arguments->scene);
+  command.add_flag("--parts", arguments->parts, "also write one PLY per reference camera, into OUTPUT.parts/");
+  command.add_option("--work-dir", arguments->settings.work_folder,
+                     "state and surfaces while it runs [OUTPUT.ply.work]; removed at the end");
+  command.add_flag("--keep-work-dir", arguments->settings.keep_work_folder, "do not remove it at the end");
+  command.add_flag("--restart", arguments->settings.restart, "begin anew, whatever the work folder holds");
+  AddThreadsOption(command, arguments->settings.threads);
+  command
+      .add_option("--memory", arguments->memory_mib,
+                  "MiB to stay below: fewer cameras at the same time where they are large; no influence on the "
+                  "result [512 for each thread, at least 1024]")
+      ->check(CLI::Range(int64_t{64}, int64_t{1} << 30));
+  AddOutputOptions(command, arguments->output);
+  VisitOptions(arguments->options, [&](const char* group, const char* name, auto& field, const char* help) {
+    command.add_option(absl::StrCat("--", name), field, help)->group(group)->capture_default_str();
+  });
+  command.callback([arguments, &run] { run = [arguments] { return Reconstruct(*arguments); }; });
+}
+
+}  // namespace meshwright
