@@ -57,6 +57,7 @@ class KnownSeeds {
  private:
   static PixelIndex Index(const std::vector<Seed>& seeds, const Lattice& lattice) {
     std::vector<Eigen::Vector2f> pixels;
+    pixels.reserve(seeds.size());
     for (const Seed& seed : seeds) {
       pixels.push_back(lattice.Pixel(seed.node % lattice.columns, seed.node / lattice.columns).cast<float>());
     }

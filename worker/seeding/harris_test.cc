@@ -102,7 +102,7 @@ TEST(HarrisTest, EqualsSlowTwinWithAnyNumberOfThreads) {
 TEST(HarrisTest, FindsTheCornersOfARectangleAndNoEdges) {
   GreyImage grey{100, 80, std::vector<uint8_t>(100 * 80, 40)};
   for (int y = 20; y < 60; ++y) {
-    for (int x = 30; x < 70; ++x) grey.grey[static_cast<size_t>(y * 100 + x)] = 200;
+    for (int x = 30; x < 70; ++x) grey.grey[static_cast<size_t>(y) * 100 + static_cast<size_t>(x)] = 200;
   }
   ThreadPool pool(1);
   const std::vector<Corner> corners = DetectHarrisCorners(SamplingImage(grey, 1), {}, pool);

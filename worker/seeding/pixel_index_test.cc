@@ -16,6 +16,7 @@ constexpr int kHeight = 130;
 
 std::vector<Eigen::Vector2f> RandomPoints(int count, std::mt19937& random) {
   std::vector<Eigen::Vector2f> points;
+  points.reserve(static_cast<size_t>(count));
   for (int i = 0; i < count; ++i) {
     // A few lie just outside.
     points.emplace_back(static_cast<float>(random() % (kWidth + 6)) - 3, static_cast<float>(random() % kHeight) + 0.5F);
@@ -69,6 +70,7 @@ TEST(PixelIndexTest, FindsTheNearest) {
     std::sort(expected.begin(), expected.end());
     expected.resize(std::min<size_t>(expected.size(), 9));
     std::vector<int32_t> expected_indices;
+    expected_indices.reserve(expected.size());
     for (const auto& [squared, i] : expected) expected_indices.push_back(i);
     EXPECT_EQ(index.FindNearest(place, 9, reach), expected_indices);
   }

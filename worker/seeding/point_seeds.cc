@@ -136,6 +136,7 @@ PointSeeds SeedPoints(const SeedFitter& fitter, const std::vector<SparsePointObs
            std::make_tuple(b.pixel.y(), b.pixel.x(), b.w, b.seen_by);
   });
   std::vector<Eigen::Vector2f> pixels;
+  pixels.reserve(projected.size());
   for (const Projected& point : projected) pixels.push_back(point.pixel);
   const PixelIndex index(reference.width, reference.height, kCellSize, pixels);
 

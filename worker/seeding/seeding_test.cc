@@ -113,6 +113,7 @@ ScoredView Render(const std::vector<TexturedPlane>& planes, const Camera& camera
 
 PatchScorer MakeScorer(const std::vector<TexturedPlane>& planes, const std::vector<Eigen::Vector3d>& target_centers) {
   std::vector<ScoredView> targets;
+  targets.reserve(target_centers.size());
   for (const Eigen::Vector3d& center : target_centers) targets.push_back(Render(planes, LookingAlongZ(center)));
   return {Render(planes, LookingAlongZ({0, 0, 0})), std::move(targets), {}};
 }

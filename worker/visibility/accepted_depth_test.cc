@@ -168,6 +168,7 @@ TEST(AcceptedDepthTest, AWholeSurfaceHasNoGapsBetweenItsTriangles) {
 TEST(AcceptedDepthTest, OrderOfSurfacesAndNumberOfThreadsDoNotMatter) {
   const Camera reference = CameraAt({0.1, 0.3, -0.5}, 0.1, 160, 120, 120);
   std::vector<PatchLattice> surfaces;
+  surfaces.reserve(5);
   for (int i = 0; i < 4; ++i) {
     surfaces.push_back(
         Wavy(CameraAt({0.7 * i - 1, 0.1 * i, 0}, 0.1 * i, 160, 120, 120), 1 + i % 3, static_cast<uint32_t>(i)));
