@@ -123,7 +123,7 @@ Vector2d Lens::PixelFromPlane(const Vector2d& undistorted) const {
 
 Vector2d Lens::PlaneFromPixel(const Vector2d& pixel) const {
   const double y = (pixel.y() - cy) / fy;
-  const Vector2d distorted((pixel.x() - cx - skew * y) / fx, y);
+  Vector2d distorted((pixel.x() - cx - skew * y) / fx, y);
   if (model == Model::kPinhole) return distorted;
   if (model == Model::kFov) return UndistortFov(distorted, coefficients[0]);
   const Vector2d x = InvertPolynomial(*this, distorted);

@@ -14,7 +14,7 @@ namespace {
 ColorImage RandomImage(int width, int height, unsigned seed) {
   std::mt19937 generator(seed);
   ColorImage image{.width = width, .height = height, .rgb = {}};
-  image.rgb.resize(static_cast<size_t>(3 * width * height));
+  image.rgb.resize(size_t{3} * static_cast<size_t>(width) * static_cast<size_t>(height));
   for (uint8_t& sample : image.rgb) sample = static_cast<uint8_t>(generator() & 0xFFU);
   return image;
 }

@@ -104,7 +104,7 @@ absl::Status Damaged(const ErrorManager& errors) {
 bool LooksLikeJpeg(const std::string& bytes) { return bytes.compare(0, 3, "\xFF\xD8\xFF") == 0; }
 
 absl::StatusOr<ImageSize> JpegSize(const std::string& bytes) {
-  ErrorManager errors;
+  ErrorManager errors{};
   jpeg_decompress_struct info{};
   info.err = &errors.first;
   SetUpErrors(&errors);
@@ -116,7 +116,7 @@ absl::StatusOr<ImageSize> JpegSize(const std::string& bytes) {
 }
 
 absl::StatusOr<ColorImage> DecodeJpeg(const std::string& bytes) {
-  ErrorManager errors;
+  ErrorManager errors{};
   jpeg_decompress_struct info{};
   info.err = &errors.first;
   SetUpErrors(&errors);
@@ -134,7 +134,7 @@ absl::StatusOr<ColorImage> DecodeJpeg(const std::string& bytes) {
 std::string EncodeJpeg(const ColorImage& image, int quality) {
   MW_CHECK(image.width >= 1 && image.height >= 1 && image.width <= 65500 && image.height <= 65500);
   MW_CHECK(image.rgb.size() == size_t{3} * static_cast<size_t>(image.width) * static_cast<size_t>(image.height));
-  ErrorManager errors;
+  ErrorManager errors{};
   jpeg_compress_struct info{};
   info.err = &errors.first;
   SetUpErrors(&errors);

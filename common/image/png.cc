@@ -16,7 +16,7 @@ namespace {
 // libpng reports errors through a callback that must not return: it leaves by longjmp, so the functions that set a jump
 // own nothing that has a destructor.
 struct ErrorState {
-  std::jmp_buf jump;
+  std::jmp_buf jump = {};
   char message[256] = "";
 };
 
@@ -30,7 +30,7 @@ struct ErrorState {
 void IgnoreWarning(png_structp, png_const_charp) {}
 
 struct Source {
-  const std::string* bytes;
+  const std::string* bytes = nullptr;
   size_t offset = 0;
 };
 

@@ -28,7 +28,7 @@ class BinaryFields {
   template <typename T>
   absl::StatusOr<T> Read(const char* field) {
     if (sizeof(T) > Remaining()) return EndsEarly(field);
-    T value;
+    T value{};
     std::memcpy(&value, bytes_.data() + offset_, sizeof(T));
     offset_ += sizeof(T);
     return value;

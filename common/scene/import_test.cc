@@ -290,8 +290,8 @@ TEST(ImportScene, ScenesWithoutCameras) {
 }
 
 TEST(ImportScene, PicturesThatAreMissingOrDoNotFit) {
-  for (SceneFiles files : {SmallColmapText(), SmallColmapBinary(), SmallMiddlebury(), SmallStrecha()}) {
-    std::string picture = files.contains("c.png") ? "c.png" : "images/c.png";
+  for (const SceneFiles& files : {SmallColmapText(), SmallColmapBinary(), SmallMiddlebury(), SmallStrecha()}) {
+    const std::string picture = files.contains("c.png") ? "c.png" : "images/c.png";
     SceneFiles damaged = files;
     damaged.erase(picture);
     absl::Status status = ImportError(damaged);

@@ -81,7 +81,7 @@ void AppendPoint(uint64_t id, const std::array<double, 3>& x, const std::vector<
 
 std::string FreshFolder(const std::string& name) {
   static const TemporaryFolder root;
-  const std::string folder = JoinPath(root.path(), name);
+  std::string folder = JoinPath(root.path(), name);
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;

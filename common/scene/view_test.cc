@@ -62,7 +62,7 @@ int LargestDifference(const ColorImage& a, const ColorImage& b) {
 }
 
 SceneView WriteView(const Lens& lens, const std::string& name) {
-  const SceneView view{.name = name, .image_path = JoinPath(FreshFolder("view"), name + ".png"), .lens = lens};
+  SceneView view{.name = name, .image_path = JoinPath(FreshFolder("view"), name + ".png"), .lens = lens};
   const ColorImage image =
       Render(lens.width, lens.height, [&](const Eigen::Vector2d& pixel) { return lens.PlaneFromPixel(pixel); });
   EXPECT_TRUE(WritePng(view.image_path, image).ok());
