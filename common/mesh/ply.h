@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
+#include <absl/types/span.h>
 
 #include "common/base/files.h"
 #include "common/mesh/triangle_mesh.h"
@@ -46,6 +48,8 @@ class PlyStreamWriter {
   // Faces of `part` index the part's own vertices. The part must have every attribute named at Create; others are
   // ignored. OutOfRange when the file would have more vertices than an index of 32 bits can tell apart.
   absl::Status Append(const TriangleMesh& part);
+  // Faces between vertices that were appended in any part before. Corners count from the first vertex of the file.
+  absl::Status AppendFaces(absl::Span<const std::array<uint32_t, 3>> faces);
   absl::Status Commit();
 
   int64_t vertices() const { return vertices_; }

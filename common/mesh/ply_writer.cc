@@ -81,10 +81,9 @@ absl::Status WriteVertices(const TriangleMesh& mesh, const PlyAttributes& attrib
 }
 
 template <typename Write>
-absl::Status WriteFaces(const TriangleMesh& mesh, uint32_t first_vertex, const Write& write) {
+absl::Status WriteFaces(absl::Span<const std::array<uint32_t, 3>> faces, uint32_t first_vertex, const Write& write) {
   return WriteRows(
-      mesh.faces.size(), kFaceBytes, [&](size_t i, char* out) { return StoreFace(mesh.faces[i], first_vertex, out); },
-      write);
+      faces.size(), kFaceBytes, [&](size_t i, char* out) { return StoreFace(faces[i], first_vertex, out); }, write);
 }
 
 absl::Status CheckVertexCount(uint64_t vertices, const std::string& path) {
@@ -123,7 +122,7 @@ absl::Status WritePly(const TriangleMesh& mesh, const std::string& path) {
   MW_RETURN_IF_ERROR(file.Append(ply::FormatHeader(attributes, static_cast<int64_t>(mesh.positions.size()),
                                                    static_cast<int64_t>(mesh.faces.size()))));
   MW_RETURN_IF_ERROR(WriteVertices(mesh, attributes, file));
-  MW_RETURN_IF_ERROR(WriteFaces(mesh, 0, [&](absl::Span<const uint8_t> bytes) { return file.Append(bytes); }));
+  MW_RETURN_IF_ERROR(WriteFaces(mesh.faces, 0, [&](absl::Span<const uint8_t> bytes) { return file.Append(bytes); }));
   return file.Commit();
 }
 
@@ -157,11 +156,22 @@ absl::StatusOr<PlyStreamWriter> PlyStreamWriter::Create(const std::string& path,
 absl::Status PlyStreamWriter::Append(const TriangleMesh& part) {
   MW_RETURN_IF_ERROR(CheckVertexCount(static_cast<uint64_t>(vertices_) + part.positions.size(), path_));
   MW_RETURN_IF_ERROR(WriteVertices(part, attributes_, file_));
-  MW_RETURN_IF_ERROR(WriteFaces(part, static_cast<uint32_t>(vertices_), [&](absl::Span<const uint8_t> bytes) {
+  MW_RETURN_IF_ERROR(WriteFaces(part.faces, static_cast<uint32_t>(vertices_), [&](absl::Span<const uint8_t> bytes) {
     return WriteToTemporary(faces_descriptor_, bytes, path_);
   }));
   vertices_ += static_cast<int64_t>(part.positions.size());
   faces_ += static_cast<int64_t>(part.faces.size());
+  return absl::OkStatus();
+}
+
+absl::Status PlyStreamWriter::AppendFaces(absl::Span<const std::array<uint32_t, 3>> faces) {
+  for (const auto& face : faces) {
+    for (const uint32_t corner : face) MW_CHECK(static_cast<int64_t>(corner) < vertices_);
+  }
+  MW_RETURN_IF_ERROR(WriteFaces(faces, 0, [&](absl::Span<const uint8_t> bytes) {
+    return WriteToTemporary(faces_descriptor_, bytes, path_);
+  }));
+  faces_ += static_cast<int64_t>(faces.size());
   return absl::OkStatus();
 }
 

@@ -1,0 +1,384 @@
+#include "common/mesh/border_stitching.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <tuple>
+
+#include <Eigen/Geometry>
+
+#include "common/base/check.h"
+
+namespace meshwright {
+namespace {
+
+// A triangle across a seam climbs the parts' difference in depth, so it may lean more than the parts themselves do.
+constexpr double kMinSeamNormalCosine = 0.3;
+constexpr double kMinHoleNormalCosine = 0.4;
+// Vertices whose normals differ more belong to another sheet.
+constexpr double kMinSheetCosine = 0.5;
+
+double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// Whether the open segments meet in one point that is inside both.
+bool Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
+  const double p_side = Cross(b - a, p - a);
+  const double q_side = Cross(b - a, q - a);
+  const double a_side = Cross(q - p, a - p);
+  const double b_side = Cross(q - p, b - p);
+  return ((p_side > 0) != (q_side > 0)) && ((a_side > 0) != (b_side > 0)) && p_side != 0 && q_side != 0 &&
+         a_side != 0 && b_side != 0;
+}
+
+// Whether direction d lies in the sector that runs counter-clockwise about `normal` from `first` to `last`.
+bool InSector(const Eigen::Vector3d& normal, const Eigen::Vector3d& first, const Eigen::Vector3d& d,
+              const Eigen::Vector3d& last) {
+  const auto turn = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) { return normal.dot(from.cross(to)); };
+  if (turn(first, last) >= 0) return turn(first, d) >= 0 && turn(d, last) >= 0;
+  return !(turn(last, d) > 0 && turn(d, first) > 0);
+}
+
+}  // namespace
+
+// Plane along an open edge in which its neighbourhood is looked at: x along the edge, y away from its triangle.
+struct BorderStitcher::EdgeFrame {
+  Eigen::Vector3d a, b, normal, x_axis, y_axis;
+  int32_t a_vertex = 0;
+  int32_t b_vertex = 0;
+  struct Segment {
+    Eigen::Vector2d from, to;
+    int32_t from_vertex = 0;
+    int32_t to_vertex = 0;
+  };
+  std::vector<Segment> blockers;
+
+  Eigen::Vector2d Project(const Eigen::Vector3d& x) const { return {(x - a).dot(x_axis), (x - a).dot(y_axis)}; }
+
+  bool IsBlocked(const Eigen::Vector2d& from, int32_t from_vertex, const Eigen::Vector2d& to,
+                 int32_t to_vertex) const {
+    return std::ranges::any_of(blockers, [&](const Segment& s) {
+      if (s.from_vertex == from_vertex || s.from_vertex == to_vertex || s.to_vertex == from_vertex ||
+          s.to_vertex == to_vertex) {
+        return false;
+      }
+      return Cross(from, to, s.from, s.to);
+    });
+  }
+};
+
+BorderStitcher::BorderStitcher(std::vector<BorderVertex> vertices,
+                               absl::Span<const std::pair<int32_t, int32_t>> inner_edges)
+    : vertices_(std::move(vertices)) {
+  corners_.resize(vertices_.size());
+  for (size_t v = 0; v < vertices_.size(); ++v) {
+    const int32_t next = vertices_[v].next;
+    corners_[v].vertex = static_cast<int32_t>(v);
+    corners_[v].next = next;
+    At(next).previous = static_cast<int32_t>(v);
+    AddEdge(static_cast<int32_t>(v), next);
+  }
+  for (const auto& [v, w] : inner_edges) AddEdge(v, w);
+}
+
+bool BorderStitcher::HasEdge(int32_t v, int32_t w) const { return edges_.contains(std::minmax(v, w)); }
+void BorderStitcher::AddEdge(int32_t v, int32_t w) { edges_.insert(std::minmax(v, w)); }
+
+int64_t BorderStitcher::CountOpenEdges() const {
+  return std::ranges::count_if(corners_, [](const Corner& corner) { return corner.open; });
+}
+
+std::vector<int32_t> BorderStitcher::VerticesWithSeveralGaps() const {
+  std::vector<int32_t> open(vertices_.size(), 0);
+  for (const Corner& corner : corners_) open[static_cast<size_t>(corner.vertex)] += corner.open ? 1 : 0;
+  std::vector<int32_t> found;
+  for (size_t v = 0; v < open.size(); ++v) {
+    if (open[v] > 1) found.push_back(static_cast<int32_t>(v));
+  }
+  return found;
+}
+
+void BorderStitcher::Drop(const std::vector<uint8_t>& drop) {
+  MW_CHECK(drop.size() == vertices_.size());
+  for (Corner& corner : corners_) {
+    if (drop[static_cast<size_t>(corner.vertex)] != 0) corner.open = false;
+  }
+}
+
+void BorderStitcher::FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found) {
+  const int level = static_cast<int>(std::ceil(std::log2(radius)));
+  const double width = std::ldexp(1.0, level);
+  const auto cell_of = [&](const Eigen::Vector3d& at) {
+    std::array<int32_t, 3> cell;
+    for (int k = 0; k < 3; ++k) {
+      // Far beyond any scene the cells melt into one; that costs time only.
+      cell[static_cast<size_t>(k)] = static_cast<int32_t>(std::clamp(std::floor(at[k] / width), -1e9, 1e9));
+    }
+    return cell;
+  };
+  auto [grid, is_new] = grids_.try_emplace(level);
+  if (is_new) {
+    for (size_t v = 0; v < vertices_.size(); ++v) {
+      if (vertices_[v].spacing <= width) {
+        grid->second[cell_of(vertices_[v].position.cast<double>())].push_back(static_cast<int32_t>(v));
+      }
+    }
+  }
+  found.clear();
+  const auto [cx, cy, cz] = cell_of(x);
+  for (int32_t z = cz - 1; z <= cz + 1; ++z) {
+    for (int32_t y = cy - 1; y <= cy + 1; ++y) {
+      for (int32_t i = cx - 1; i <= cx + 1; ++i) {
+        const auto cell = grid->second.find({i, y, z});
+        if (cell == grid->second.end()) continue;
+        for (const int32_t v : cell->second) {
+          if ((Position(v) - x).squaredNorm() <= radius * radius) found.push_back(v);
+        }
+      }
+    }
+  }
+}
+
+// Whether the edge from the corner's vertex to `vertex` starts in the corner's gap.
+bool BorderStitcher::InGap(int32_t corner, int32_t vertex) const {
+  const Corner& at = At(corner);
+  const int32_t previous = VertexOf(at.previous);
+  const int32_t next = VertexOf(at.next);
+  if (vertex == previous || vertex == next) return true;
+  const Eigen::Vector3d x = Position(at.vertex);
+  return InSector(Normal(at.vertex), Position(previous) - x, Position(vertex) - x, Position(next) - x);
+}
+
+bool BorderStitcher::Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope) const {
+  const int32_t end = At(edge).next;
+  const int32_t c = VertexOf(corner);
+  const bool after = At(end).next == corner;
+  const bool before = At(edge).previous == corner;
+  if (!after && HasEdge(frame.b_vertex, c)) return false;
+  if (!before && HasEdge(frame.a_vertex, c)) return false;
+  const Eigen::Vector3d x = Position(c);
+  const Eigen::Vector3d normal = (frame.a - frame.b).cross(x - frame.b).normalized();
+  for (const int32_t v : {frame.a_vertex, frame.b_vertex, c}) {
+    if (!(normal.dot(Normal(v)) > scope.min_normal_cosine)) return false;
+  }
+  if (!before && !InGap(edge, c)) return false;
+  if (!after && !InGap(end, c)) return false;
+  if (!before && !InGap(corner, frame.a_vertex)) return false;
+  if (!after && !InGap(corner, frame.b_vertex)) return false;
+  if (!before && !after) {
+    // Counter-clockwise around c: its previous vertex, b, a, its next vertex.
+    const Eigen::Vector3d next = Position(VertexOf(At(corner).next));
+    if (!InSector(Normal(c), frame.b - x, frame.a - x, next - x)) return false;
+  }
+  const Eigen::Vector2d at = frame.Project(x);
+  if (!before && frame.IsBlocked({0, 0}, frame.a_vertex, at, c)) return false;
+  return after || !frame.IsBlocked(frame.Project(frame.b), frame.b_vertex, at, c);
+}
+
+BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& scope) {
+  EdgeFrame frame;
+  frame.a_vertex = VertexOf(edge);
+  frame.b_vertex = VertexOf(At(edge).next);
+  frame.a = Position(frame.a_vertex);
+  frame.b = Position(frame.b_vertex);
+  frame.normal = (Normal(frame.a_vertex) + Normal(frame.b_vertex)).normalized();
+  const double length = (frame.b - frame.a).norm();
+  if (!(length > 0)) return {};
+  frame.y_axis = (frame.b - frame.a).cross(frame.normal).normalized();
+  frame.x_axis = frame.normal.cross(frame.y_axis).normalized();
+  const double spacing =
+      std::max<double>(Vertex(frame.a_vertex).spacing, Vertex(frame.b_vertex).spacing);
+  const double reach = scope.reach * spacing;
+  const std::vector<int32_t>* around = scope.members;
+  if (around == nullptr) {
+    FindNearby(0.5 * (frame.a + frame.b), 2 * reach + length, nearby_);
+    around = &nearby_;
+  }
+
+  struct Apex {
+    double cosine;
+    double cost;
+    int32_t corner;
+  };
+  std::vector<Apex> apexes;
+  for (const int32_t v : *around) {
+    if (!(Normal(v).dot(frame.normal) > kMinSheetCosine)) continue;
+    const Eigen::Vector3d x = Position(v);
+    const Eigen::Vector2d at = frame.Project(x);
+    Apex apex = {2, 0, -1};
+    if (v != frame.a_vertex && v != frame.b_vertex && at.y() > 0) {
+      const Eigen::Vector3d to_a = (frame.a - x).normalized();
+      const Eigen::Vector3d to_b = (frame.b - x).normalized();
+      apex.cosine = to_a.dot(to_b);
+      const double sine = to_a.cross(to_b).norm();
+      apex.cost = (apex.cosine > 0 ? 0.5 * length / sine : 0.5 * length) / spacing;
+    }
+    for (int32_t corner = v; corner >= 0; corner = At(corner).sibling) {
+      if (!At(corner).open) continue;
+      const int32_t next = VertexOf(At(corner).next);
+      frame.blockers.push_back({at, frame.Project(Position(next)), v, next});
+      if (apex.cosine < 1 && apex.cost <= scope.reach) {
+        apex.corner = corner;
+        apexes.push_back(apex);
+      }
+    }
+  }
+  std::ranges::sort(apexes, {}, [](const Apex& apex) { return std::pair(apex.cosine, apex.corner); });
+  for (const Apex& apex : apexes) {
+    if (Fits(frame, edge, apex.corner, scope)) return {apex.cost, apex.corner};
+  }
+  return {};
+}
+
+// Puts the triangle over `edge` whose apex is `corner`. `changed` gets the open edges that are new or bear a new number,
+// and those beside them.
+void BorderStitcher::Apply(int32_t edge, int32_t corner, std::vector<int32_t>& changed) {
+  const int32_t end = At(edge).next;
+  const int32_t a = VertexOf(edge);
+  const int32_t b = VertexOf(end);
+  const int32_t c = VertexOf(corner);
+  faces_.push_back({b, a, c});
+  const bool after = At(end).next == corner;
+  const bool before = At(edge).previous == corner;
+  changed.clear();
+  if (after && before) {
+    At(edge).open = At(end).open = At(corner).open = false;
+  } else if (after) {
+    At(end).open = false;
+    At(edge).next = corner;
+    At(corner).previous = edge;
+    AddEdge(a, c);
+    changed = {edge, At(edge).previous, corner};
+  } else if (before) {
+    At(edge).open = false;
+    At(corner).next = end;
+    At(end).previous = corner;
+    AddEdge(c, b);
+    changed = {corner, At(corner).previous, end};
+  } else {
+    const auto twin = static_cast<int32_t>(corners_.size());
+    corners_.push_back({.vertex = c, .previous = edge, .next = At(corner).next, .sibling = At(corner).sibling});
+    At(corner).sibling = twin;
+    At(At(twin).next).previous = twin;
+    At(edge).next = twin;
+    At(corner).next = end;
+    At(end).previous = corner;
+    AddEdge(a, c);
+    AddEdge(c, b);
+    changed = {edge, corner, twin, At(edge).previous, end, At(corner).previous};
+  }
+}
+
+void BorderStitcher::Advance(absl::Span<const int32_t> edges, const Scope& scope) {
+  struct Entry {
+    Candidate candidate;
+    int32_t edge;
+    int32_t next;
+    bool operator<(const Entry& other) const {  // the best one is the greatest
+      return std::tie(other.candidate.cost, other.edge, other.next) < std::tie(candidate.cost, edge, next);
+    }
+  };
+  std::priority_queue<Entry> queue;
+  const auto push = [&](int32_t edge) {
+    if (!At(edge).open) return;
+    const Candidate best = BestFor(edge, scope);
+    if (best.corner >= 0) queue.push({best, edge, At(edge).next});
+  };
+  for (const int32_t edge : edges) push(edge);
+  std::vector<int32_t> changed;
+  while (!queue.empty()) {
+    const Entry top = queue.top();
+    queue.pop();
+    if (!At(top.edge).open || At(top.edge).next != top.next) continue;
+    const Candidate best = BestFor(top.edge, scope);
+    if (best.corner < 0) continue;
+    if (best.cost > top.candidate.cost) {
+      queue.push({best, top.edge, top.next});
+      continue;
+    }
+    Apply(top.edge, best.corner, changed);
+    for (const int32_t edge : changed) push(edge);
+  }
+}
+
+void BorderStitcher::StitchNearby(double reach) {
+  std::vector<int32_t> edges(corners_.size());
+  for (size_t i = 0; i < edges.size(); ++i) edges[i] = static_cast<int32_t>(i);
+  Advance(edges, {.reach = reach, .min_normal_cosine = kMinSeamNormalCosine});
+}
+
+// A loop of open edges around a hole, and the borders of islands in it.
+struct BorderStitcher::Hole {
+  Eigen::Vector3d center, normal;
+  double radius = 0;
+  std::vector<int32_t> corners;
+};
+
+std::vector<BorderStitcher::Hole> BorderStitcher::FindHoles(double max_width) const {
+  std::vector<Hole> holes;
+  std::vector<Hole> islands;
+  std::vector<uint8_t> seen(corners_.size(), 0);
+  for (size_t i = 0; i < corners_.size(); ++i) {
+    if (!corners_[i].open || seen[i] != 0) continue;
+    Hole loop;
+    Eigen::Vector3d center = Eigen::Vector3d::Zero();
+    double spacing = 0;
+    for (auto corner = static_cast<int32_t>(i); seen[static_cast<size_t>(corner)] == 0; corner = At(corner).next) {
+      seen[static_cast<size_t>(corner)] = 1;
+      loop.corners.push_back(corner);
+      center += Position(VertexOf(corner));
+      spacing += Vertex(VertexOf(corner)).spacing;
+    }
+    const auto count = static_cast<double>(loop.corners.size());
+    loop.center = center / count;
+    spacing /= count;
+    Eigen::Vector3d area = Eigen::Vector3d::Zero();
+    Eigen::Vector3d normals = Eigen::Vector3d::Zero();
+    for (const int32_t corner : loop.corners) {
+      const Eigen::Vector3d x = Position(VertexOf(corner)) - loop.center;
+      area += x.cross(Position(VertexOf(At(corner).next)) - loop.center);
+      normals += Normal(VertexOf(corner));
+      loop.radius = std::max(loop.radius, x.norm());
+    }
+    if (2 * loop.radius > max_width * spacing || !(area.norm() > 0)) continue;
+    if (area.dot(normals) > 0) {  // the part lies inside
+      loop.normal = area.normalized();
+      islands.push_back(std::move(loop));
+      continue;
+    }
+    loop.normal = -area.normalized();
+    const bool is_flat = std::ranges::all_of(loop.corners, [&](int32_t corner) {
+      const int32_t v = VertexOf(corner);
+      return Normal(v).dot(loop.normal) > kMinSheetCosine &&
+             std::abs((Position(v) - loop.center).dot(loop.normal)) < 0.5 * loop.radius + 1.5 * spacing;
+    });
+    if (is_flat) holes.push_back(std::move(loop));
+  }
+  for (const Hole& island : islands) {
+    for (Hole& hole : holes) {
+      const Eigen::Vector3d offset = island.center - hole.center;
+      if (offset.norm() + island.radius < 1.01 * hole.radius && island.normal.dot(hole.normal) > kMinSheetCosine) {
+        hole.corners.insert(hole.corners.end(), island.corners.begin(), island.corners.end());
+        break;
+      }
+    }
+  }
+  return holes;
+}
+
+int64_t BorderStitcher::FillHoles(double max_width) {
+  const std::vector<Hole> holes = FindHoles(max_width);
+  std::vector<int32_t> members;
+  for (const Hole& hole : holes) {
+    members.clear();
+    for (const int32_t corner : hole.corners) members.push_back(VertexOf(corner));
+    std::ranges::sort(members);
+    members.erase(std::unique(members.begin(), members.end()), members.end());
+    Advance(hole.corners, {.reach = std::numeric_limits<double>::infinity(),
+                           .min_normal_cosine = kMinHoleNormalCosine,
+                           .members = &members});
+  }
+  return static_cast<int64_t>(holes.size());
+}
+
+}  // namespace meshwright

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+#include <absl/container/flat_hash_map.h>
+#include <absl/container/flat_hash_set.h>
+#include <absl/types/span.h>
+
+namespace meshwright {
+
+// A vertex on the border of a part, with what is needed to sew it to others.
+struct BorderVertex {
+  Eigen::Vector3f position;  // scene units, world frame
+  Eigen::Vector3f normal;    // unit
+  float spacing = 0;         // scene units; distance to its neighbours in its lattice
+  int32_t next = 0;          // border vertex where the border goes on, the part to its left
+};
+
+// Sews borders together with triangles between their vertices: an advancing front that gives each open edge the
+// visible vertex that makes the largest angle over it, as a constrained Delaunay triangulation does, smallest
+// circumcircles first (cf. Bernardini et al. 1999). Only open edges take a triangle and no edge is made twice, so that
+// each edge has at most two triangles, and those run along it in opposite directions. The order, and so the result,
+// depends on the border alone.
+class BorderStitcher {
+ public:
+  using Face = std::array<int32_t, 3>;  // border vertices, counter-clockwise seen from outside
+
+  // `inner_edges`: pairs of border vertices that an edge joins which has its two triangles already.
+  BorderStitcher(std::vector<BorderVertex> vertices, absl::Span<const std::pair<int32_t, int32_t>> inner_edges);
+
+  // Fills gaps wherever circumcircles have a radius of at most `reach` times the vertices' spacing.
+  void StitchNearby(double reach);
+
+  // Takes the borders of all vertices with drop[vertex] out of the game.
+  void Drop(const std::vector<uint8_t>& drop);
+
+  // Fills loops around holes of at most `max_width` times the vertices' spacing whose rims are nearly flat, together
+  // with the islands in them. Returns how many.
+  int64_t FillHoles(double max_width);
+
+  const std::vector<BorderVertex>& vertices() const { return vertices_; }
+  const std::vector<Face>& faces() const { return faces_; }
+  int64_t CountOpenEdges() const;
+  // Vertices that several gaps meet, ascending, with how many.
+  std::vector<int32_t> VerticesWithSeveralGaps() const;
+
+ private:
+  // One gap at a vertex: the open edge that comes in and the one that goes out. A vertex may have several. The open
+  // edge from a corner to the next one bears the corner's number.
+  struct Corner {
+    int32_t vertex = 0;
+    int32_t previous = 0;
+    int32_t next = 0;
+    int32_t sibling = -1;  // another corner of the same vertex
+    bool open = true;
+  };
+  struct Candidate {
+    double cost = 0;      // radius of the circumcircle over the spacing
+    int32_t corner = -1;  // to which the triangle goes; -1: none
+    friend bool operator==(const Candidate&, const Candidate&) = default;
+  };
+  // What an edge may be joined to and within which limits.
+  struct Scope {
+    double reach = 0;
+    double min_normal_cosine = 0;
+    const std::vector<int32_t>* members = nullptr;  // vertices; null: all in the neighbourhood
+  };
+  struct EdgeFrame;
+  struct Hole;
+
+  Candidate BestFor(int32_t edge, const Scope& scope);
+  bool Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope) const;
+  bool InGap(int32_t corner, int32_t vertex) const;
+  bool HasEdge(int32_t v, int32_t w) const;
+  void AddEdge(int32_t v, int32_t w);
+  void Apply(int32_t edge, int32_t corner, std::vector<int32_t>& changed);
+  void Advance(absl::Span<const int32_t> edges, const Scope& scope);
+  void FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found);
+  std::vector<Hole> FindHoles(double max_width) const;
+
+  Corner& At(int32_t corner) { return corners_[static_cast<size_t>(corner)]; }
+  const Corner& At(int32_t corner) const { return corners_[static_cast<size_t>(corner)]; }
+  int32_t VertexOf(int32_t corner) const { return At(corner).vertex; }
+  const BorderVertex& Vertex(int32_t v) const { return vertices_[static_cast<size_t>(v)]; }
+  Eigen::Vector3d Position(int32_t v) const { return Vertex(v).position.cast<double>(); }
+  Eigen::Vector3d Normal(int32_t v) const { return Vertex(v).normal.cast<double>(); }
+
+  std::vector<BorderVertex> vertices_;
+  std::vector<Corner> corners_;  // corner v is the first one of vertex v
+  std::vector<Face> faces_;
+  absl::flat_hash_set<std::pair<int32_t, int32_t>> edges_;
+  // Vertices in cubes of the grids of width 2^level; each grid is made when first asked for.
+  struct Grid;
+  absl::flat_hash_map<int, absl::flat_hash_map<std::array<int32_t, 3>, std::vector<int32_t>>> grids_;
+  std::vector<int32_t> nearby_;  // scratch
+};
+
+}  // namespace meshwright

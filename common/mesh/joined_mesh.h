@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "common/base/thread_pool.h"
+#include "common/mesh/surface_union.h"
+
+namespace meshwright {
+
+struct JoinOptions {
+  // Pieces with fewer triangles, once everything is stitched, are left out. >= 0.
+  int64_t min_component_faces = 100;
+  // Holes up to this wide with a nearly flat rim are closed. Lattice steps, 0 .. 1000.
+  double max_hole_steps = 30;
+  // How far from a seam the parts' colours and depths run into each other. Lattice steps, 0 .. 1000.
+  int blend_steps = 16;
+
+  absl::Status Validate() const;
+};
+
+struct JoinedMeshCounts {
+  int64_t vertices = 0;
+  int64_t faces = 0;
+  int64_t patches_trimmed = 0;      // left out because an earlier surface shows them
+  int64_t border_edges_before = 0;  // edges with one triangle, of the trimmed parts side by side
+  int64_t border_edges_after = 0;   // the same in the mesh
+  int64_t stitch_faces = 0;
+  int64_t holes_filled = 0;
+  int64_t hole_faces = 0;
+  int64_t components_removed = 0;
+};
+
+// Joins the accepted surfaces 0 .. count - 1 (M_r of section 3.7, Jancosek et al. 2009, which leaves them side by side)
+// into one mesh and writes it as PLY. Where surfaces overlap, the earlier one stays. Borders that come close are
+// stitched, holes filled, small pieces left out, colours and depths run into each other at the seams. Every edge has
+// one or two triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their order
+// alone, not on the threads.
+//
+// Loads each surface about twice, a few at a time, and keeps the vertices on borders of all of them (some 300 bytes
+// each, and 1/8 byte for each other patch). Errors: those of `load` or of PlyStreamWriter, InvalidArgument for options;
+// then no file appears.
+absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurface& load, const JoinOptions& options,
+                                                 const std::string& path, ThreadPool& pool);
+
+}  // namespace meshwright
