@@ -136,7 +136,9 @@ void AddHouse(WorldBuilder& builder, const SurfaceFrame& frame, const HouseStyle
     } else if (floor > 0 && t < plan.Floor(floor) + plan.band) {
       c = {.out = 0.10, .material = Material::kMarble, .ornament = style.frieze && floor == 1 ? 0.05 : 0.0};
     } else if (in_window_column && t > plan.Sill(floor) && t < plan.Lintel(floor)) {
-      c = {.out = -style.recess, .material = Material::kGlass};
+      // Behind most panes hang curtains; every fourth window is bare glass, which nothing can reconstruct.
+      const bool bare = (bay + 2 * floor) % 4 == 1;
+      c = {.out = -style.recess, .material = bare ? Material::kGlass : Material::kCurtain};
     } else if (floor == 0) {
       c = {.out = 0, .material = style.ground_floor, .roughness = 0.012, .bump_size = 0.3};
     } else if (on_pilaster) {

@@ -26,6 +26,7 @@ constexpr Recipe kRecipes[static_cast<int>(Material::kCount)] = {
     {0.55F, 0.46F, 0.30F, 0.08F, 0.70F, 2.0F, 0.06F},   // kStuccoStain
     {0.20F, 0.13F, 0.07F, 0.14F, 0.95F, 0.6F, 0.06F},   // kPlanks
     {0.05F, 0.06F, 0.07F, 0.03F, 0.50F, 1.5F, 0.02F},   // kGlass
+    {0.34F, 0.33F, 0.30F, 0.13F, 1.00F, 0.5F, 0.03F},   // kCurtain
     {0.27F, 0.25F, 0.22F, 0.22F, 1.05F, 1.0F, 0.08F},   // kGround
     {0.36F, 0.35F, 0.33F, 0.11F, 1.00F, 0.8F, 0.05F},   // kPaving
     {0.66F, 0.64F, 0.60F, 0.09F, 1.00F, 0.8F, 0.05F},   // kMarble

@@ -17,6 +17,7 @@ enum class Material : uint8_t {
   kStuccoStain,  // plaster with stains of large wavelength only
   kPlanks,       // repetitive: stripes
   kGlass,        // dark, untextured
+  kCurtain,      // behind glass: soft cloth with folds
   kGround,       // gravel: strong fine texture
   kPaving,       // repetitive: square slabs
   kMarble,       // veins

@@ -51,14 +51,7 @@ absl::Status CameraJobOptions::Validate() const {
   if (lattice_step < 1 || lattice_step > 16) {
     return absl::InvalidArgumentError(absl::StrCat("lattice_step is ", lattice_step, " px, expected 1..16"));
   }
-  if (scoring.window_radius < 1 || scoring.window_radius > 7) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("scoring.window_radius is ", scoring.window_radius, " px, expected 1..7"));
-  }
-  if (!(scoring.min_texture_sigma >= 0)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("scoring.min_texture_sigma is ", scoring.min_texture_sigma, ", expected >= 0"));
-  }
+  MW_RETURN_IF_ERROR(scoring.Validate());
   MW_RETURN_IF_ERROR(seeding.Validate());
   MW_RETURN_IF_ERROR(growing.Validate());
   return filtering.Validate();
@@ -79,7 +72,7 @@ CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions
   const SeedingResult seeding =
       FindSeeds(scorer, ObservationsOf(input), input.accepted, input.accepted.lattice, options.seeding, pool);
   for (size_t t = 0; t < input.targets.size(); ++t) {
-    if (seeding.seeds_per_target[t] < options.seeding.min_seeds_per_pair) {
+    if (seeding.matches_per_target[t] < options.seeding.min_seeds_per_pair) {
       result.weak_targets.push_back(input.targets[t].camera_index);
     }
   }

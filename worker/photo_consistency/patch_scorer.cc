@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <Eigen/LU>
+#include <absl/strings/str_cat.h>
 
 #include "common/base/check.h"
 #include "worker/photo_consistency/ncc_kernel.h"
@@ -19,6 +20,8 @@ constexpr float kMinAreaRatio = 0.02F;
 constexpr float kAreaRatioForNextLevel = 2.0F;
 // Keeps rounding in the kernel from leaving the image, px.
 constexpr float kBorderMargin = 0.05F;
+// Below it the weights leave only pixels of the centre's value, squared grey levels.
+constexpr float kMinWeightedVariance = 0.05F;
 
 }  // namespace
 
@@ -36,6 +39,20 @@ Eigen::Vector3d NormalInCam(const Camera& reference, double x0, double y0, const
   return -(reference.K().transpose() * m).normalized();
 }
 
+absl::Status PatchScorer::Options::Validate() const {
+  if (window_radius < 1 || window_radius > 7) {
+    return absl::InvalidArgumentError(absl::StrCat("scoring.window_radius is ", window_radius, " px, expected 1..7"));
+  }
+  if (!(similarity_scale > 0)) {
+    return absl::InvalidArgumentError(absl::StrCat("scoring.similarity_scale is ", similarity_scale, ", expected > 0"));
+  }
+  if (!(min_texture_sigma >= 0)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("scoring.min_texture_sigma is ", min_texture_sigma, ", expected >= 0"));
+  }
+  return absl::OkStatus();
+}
+
 // K_t R K_r^-1 and K_t t, so that the homography of a plane m is a + b m^T.
 struct PatchScorer::Target {
   Eigen::Matrix3f a;
@@ -51,11 +68,12 @@ PatchScorer::PatchScorer(ScoredView reference, std::vector<ScoredView> targets, 
   padded_samples_ = (samples_ + kNccGroup - 1) / kNccGroup * kNccGroup;
   dx_.assign(static_cast<size_t>(padded_samples_), 0.0F);
   dy_.assign(static_cast<size_t>(padded_samples_), 0.0F);
-  weights_.assign(static_cast<size_t>(padded_samples_), 0.0F);
   for (int k = 0; k < samples_; ++k) {
     dx_[static_cast<size_t>(k)] = static_cast<float>(k % side - options_.window_radius);
     dy_[static_cast<size_t>(k)] = static_cast<float>(k / side - options_.window_radius);
-    weights_[static_cast<size_t>(k)] = 1.0F / static_cast<float>(samples_);
+  }
+  for (size_t d = 0; d < similarity_.size(); ++d) {
+    similarity_[d] = static_cast<float>(std::exp(-static_cast<double>(d) / options_.similarity_scale));
   }
   for (const ScoredView& view : targets_) {
     const Rigid3 target_from_reference = view.camera.cam_from_world * Inverse(reference_.camera.cam_from_world);
@@ -97,10 +115,30 @@ void PatchScorer::MakeWindow(int x, int y, Window& window) const {
       static_cast<float>(static_cast<int64_t>(samples_) * sum_of_squares - static_cast<int64_t>(sum) * sum) / (n * n);
   window.sigma = std::sqrt(variance);
   if (window.sigma < options_.min_texture_sigma || window.sigma <= 0) return;
-  const float mean = static_cast<float>(sum) / n;
-  const float scale = 1.0F / (n * window.sigma);
-  for (int i = 0; i < samples_; ++i) window.values[i] = (window.values[i] - mean) * scale;
-  for (int i = samples_; i < padded_samples_; ++i) window.values[i] = 0.0F;
+  const int center = static_cast<int>(window.values[samples_ / 2]);
+  float total = 0;
+  for (int i = 0; i < samples_; ++i) {
+    const int difference = std::abs(static_cast<int>(window.values[i]) - center);
+    const float weight = similarity_[static_cast<size_t>(difference)];
+    window.weights[i] = weight;
+    total += weight;
+  }
+  const float inverse_total = 1.0F / total;
+  float mean = 0;
+  float mean_square = 0;
+  for (int i = 0; i < samples_; ++i) {
+    window.weights[i] *= inverse_total;
+    mean += window.weights[i] * window.values[i];
+    mean_square += window.weights[i] * window.values[i] * window.values[i];
+  }
+  const float weighted_variance = mean_square - mean * mean;
+  if (weighted_variance < kMinWeightedVariance) return;
+  const float scale = 1.0F / std::sqrt(weighted_variance);
+  for (int i = 0; i < samples_; ++i) window.values[i] = (window.values[i] - mean) * scale * window.weights[i];
+  for (int i = samples_; i < padded_samples_; ++i) {
+    window.values[i] = 0.0F;
+    window.weights[i] = 0.0F;
+  }
   window.usable = true;
 }
 
@@ -162,7 +200,7 @@ float PatchScorer::Score(const Window& window, int x, int y, const PatchPlane& p
   input.count = padded_samples_;
   input.dx = dx_.data();
   input.dy = dy_.data();
-  input.weights = weights_.data();
+  input.weights = window.weights;
   input.values = window.values;
   input.quads = level.quads.data();
   input.stride = level.width;

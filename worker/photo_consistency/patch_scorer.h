@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include <Eigen/Core>
+#include <absl/status/status.h>
 
 #include "common/geometry/camera.h"
 #include "common/image/sampling_image.h"
@@ -33,7 +35,9 @@ struct ScoredView {
 };
 
 // Photo-consistency of patches of one reference view (section 3.6, Jancosek et al. 2009): normalised cross-correlation
-// (NCC) between a window of the reference and its image through the patch's plane in a target. Thread-safe.
+// (NCC) between a window of the reference and its image through the patch's plane in a target. Unlike the paper's, the
+// window has weights: pixels that differ from its centre likely belong to another surface and count less, so that a
+// window beside a depth step follows its own side (Yoon and Kweon 2006, adaptive support weights). Thread-safe.
 class PatchScorer {
  public:
   // What Score() returns when there is nothing to compare: the window leaves an image, the plane goes through a camera
@@ -42,7 +46,10 @@ class PatchScorer {
 
   struct Options {
     int window_radius = 3;           // s, px: (2 s + 1)^2 pixels, 1..7 (section 3.6: 2 or 3)
-    double min_texture_sigma = 0.5;     // standard deviation of the reference window, grey levels, >= 0
+    double similarity_scale = 15;    // grey levels at which a pixel's weight falls to 1/e of the centre's, > 0
+    double min_texture_sigma = 0.5;  // standard deviation of the reference window, grey levels, >= 0
+
+    absl::Status Validate() const;
   };
 
   PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options);
@@ -56,6 +63,7 @@ class PatchScorer {
 
   // The reference window around integer pixel (x, y), made once and compared many times.
   struct Window {
+    float weights[232];   // sum to 1
     float values[232];    // (grey - mean) / (samples * sigma); padded with zeros to whole groups
     float sigma = 0;      // grey levels
     bool usable = false;  // inside the image and textured
@@ -81,7 +89,7 @@ class PatchScorer {
   int padded_samples_ = 0;  // rounded up to whole groups of the kernel
   std::vector<float> dx_;   // px from the window's centre, per sample
   std::vector<float> dy_;
-  std::vector<float> weights_;  // 1 / samples_, 0 for padding
+  std::array<float, 256> similarity_ = {};  // weight by absolute difference from the centre, grey levels
 };
 
 }  // namespace meshwright

@@ -18,7 +18,7 @@ PatchScorer Scorer(int radius) {
   Camera target = camera;
   target.cam_from_world.translation = {-0.2, 0, 0};
   const auto image = std::make_shared<SamplingImage>(Pattern(1536, 1024), 3);
-  return PatchScorer({camera, image}, {{target, image}}, {.window_radius = radius, .min_texture_sigma = 1.0});
+  return PatchScorer({camera, image}, {{target, image}}, {.window_radius = radius});
 }
 
 void BM_Score(benchmark::State& state) {

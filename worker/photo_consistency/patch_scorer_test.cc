@@ -56,6 +56,7 @@ std::optional<double> SlowScore(const GreyImage& reference_image, const Camera& 
                                 const PatchPlane& plane, int radius) {
   std::vector<double> r;
   std::vector<double> t;
+  std::vector<double> weights;
   for (int dy = -radius; dy <= radius; ++dy) {
     for (int dx = -radius; dx <= radius; ++dx) {
       const double inverse_depth = plane.w + plane.gx * dx + plane.gy * dy;
@@ -65,23 +66,30 @@ std::optional<double> SlowScore(const GreyImage& reference_image, const Camera& 
       if (inverse_depth <= 0 || x_in_target.z() <= 0 || !target.Contains(pixel, 0.6)) return std::nullopt;
       r.push_back(reference_image.At(x + dx, y + dy));
       t.push_back(Bilinear(target_image, pixel.x(), pixel.y()));
+      weights.push_back(
+          std::exp(-std::abs(r.back() - reference_image.At(x, y)) / PatchScorer::Options{}.similarity_scale));
     }
   }
-  const double n = static_cast<double>(r.size());
+  double n = 0;
   double mean_r = 0;
   double mean_t = 0;
   for (size_t i = 0; i < r.size(); ++i) {
-    mean_r += r[i] / n;
-    mean_t += t[i] / n;
+    n += weights[i];
+    mean_r += weights[i] * r[i];
+    mean_t += weights[i] * t[i];
   }
+  mean_r /= n;
+  mean_t /= n;
   double rr = 0;
   double tt = 0;
   double rt = 0;
   for (size_t i = 0; i < r.size(); ++i) {
-    rr += (r[i] - mean_r) * (r[i] - mean_r);
-    tt += (t[i] - mean_t) * (t[i] - mean_t);
-    rt += (r[i] - mean_r) * (t[i] - mean_t);
+    rr += weights[i] * (r[i] - mean_r) * (r[i] - mean_r);
+    tt += weights[i] * (t[i] - mean_t) * (t[i] - mean_t);
+    rt += weights[i] * (r[i] - mean_r) * (t[i] - mean_t);
   }
+  // Nearly no texture left under the weights: rounding decides.
+  if (rr < n || tt < n) return std::nullopt;
   return rt / std::sqrt(rr * tt);
 }
 
@@ -93,8 +101,7 @@ struct TwoViews {
 
   PatchScorer Scorer(int radius, int levels = 1) const {
     return PatchScorer({reference, std::make_shared<SamplingImage>(reference_image, 1)},
-                       {{target, std::make_shared<SamplingImage>(target_image, levels)}},
-                       {.window_radius = radius, .min_texture_sigma = 1.0});
+                       {{target, std::make_shared<SamplingImage>(target_image, levels)}}, {.window_radius = radius});
   }
 };
 

@@ -203,7 +203,7 @@ TEST(SeedingTest, CornersOfAFrontalPlaneLieOnIt) {
     const Errors errors = Compare(result, planes, scorer.reference(), lattice);
     EXPECT_GT(errors.seeds, result.corners / 2);
     EXPECT_LE(errors.wrong_depth, errors.seeds / 50);
-    EXPECT_LE(errors.wrong_normal, errors.seeds / 10);
+    EXPECT_LE(errors.wrong_normal, errors.seeds / 6);
     EXPECT_THAT(result.seeds_per_target, testing::Each(testing::Gt(errors.seeds / 2)));
     EXPECT_EQ(result.matches_per_target, result.seeds_per_target);
   }
@@ -231,7 +231,7 @@ TEST(SeedingTest, SlantedPlanesGetTheRightSlope) {
     const Errors errors = Compare(result, {plane}, scorer.reference(), lattice);
     EXPECT_GT(errors.seeds, 60);
     EXPECT_LE(errors.wrong_depth, errors.seeds / 20);
-    EXPECT_LE(errors.wrong_normal, errors.seeds / 10);
+    EXPECT_LE(errors.wrong_normal, errors.seeds / 6);
   }
 }
 
@@ -247,7 +247,7 @@ TEST(SeedingTest, PointsOnGrazingGroundBecomeSeedsByTheirNeighbours) {
   ExpectWellFormed(result, scorer, lattice);
   const Errors errors = Compare(result, {plane}, scorer.reference(), lattice);
   EXPECT_GT(result.seeds_from_points, static_cast<int64_t>(points.size()) / 4);
-  EXPECT_LE(errors.wrong_normal, errors.seeds / 10);
+  EXPECT_LE(errors.wrong_normal, errors.seeds / 6);
 }
 
 TEST(SeedingTest, PointsThatAreWrongAreDropped) {
