@@ -46,30 +46,12 @@ struct BorderStitcher::EdgeFrame {
   Eigen::Vector3d a, b, normal, x_axis, y_axis;
   int32_t a_vertex = 0;
   int32_t b_vertex = 0;
-  struct Segment {
-    Eigen::Vector2d from, to;
-    int32_t from_vertex = 0;
-    int32_t to_vertex = 0;
-  };
-  std::vector<Segment> blockers;
-
   Eigen::Vector2d Project(const Eigen::Vector3d& x) const { return {(x - a).dot(x_axis), (x - a).dot(y_axis)}; }
-
-  bool IsBlocked(const Eigen::Vector2d& from, int32_t from_vertex, const Eigen::Vector2d& to,
-                 int32_t to_vertex) const {
-    return std::ranges::any_of(blockers, [&](const Segment& s) {
-      if (s.from_vertex == from_vertex || s.from_vertex == to_vertex || s.to_vertex == from_vertex ||
-          s.to_vertex == to_vertex) {
-        return false;
-      }
-      return Cross(from, to, s.from, s.to);
-    });
-  }
 };
 
 BorderStitcher::BorderStitcher(std::vector<BorderVertex> vertices,
                                absl::Span<const std::pair<int32_t, int32_t>> inner_edges)
-    : vertices_(std::move(vertices)) {
+    : vertices_(std::move(vertices)), open_at_vertex_(vertices_.size(), 1) {
   corners_.resize(vertices_.size());
   for (size_t v = 0; v < vertices_.size(); ++v) {
     const int32_t next = vertices_[v].next;
@@ -81,6 +63,15 @@ BorderStitcher::BorderStitcher(std::vector<BorderVertex> vertices,
   for (const auto& [v, w] : inner_edges) AddEdge(v, w);
 }
 
+// Whether an open edge crosses the segment.
+bool BorderStitcher::IsBlocked(const Eigen::Vector2d& from, int32_t from_vertex, const Eigen::Vector2d& to,
+                               int32_t to_vertex) const {
+  return std::ranges::any_of(blockers_, [&](const Segment& s) {
+    return s.from_vertex != from_vertex && s.from_vertex != to_vertex && s.to_vertex != from_vertex &&
+           s.to_vertex != to_vertex && Cross(from, to, s.from, s.to);
+  });
+}
+
 bool BorderStitcher::HasEdge(int32_t v, int32_t w) const { return edges_.contains(std::minmax(v, w)); }
 void BorderStitcher::AddEdge(int32_t v, int32_t w) { edges_.insert(std::minmax(v, w)); }
 
@@ -89,11 +80,9 @@ int64_t BorderStitcher::CountOpenEdges() const {
 }
 
 std::vector<int32_t> BorderStitcher::VerticesWithSeveralGaps() const {
-  std::vector<int32_t> open(vertices_.size(), 0);
-  for (const Corner& corner : corners_) open[static_cast<size_t>(corner.vertex)] += corner.open ? 1 : 0;
   std::vector<int32_t> found;
-  for (size_t v = 0; v < open.size(); ++v) {
-    if (open[v] > 1) found.push_back(static_cast<int32_t>(v));
+  for (size_t v = 0; v < vertices_.size(); ++v) {
+    if (open_at_vertex_[v] > 1) found.push_back(static_cast<int32_t>(v));
   }
   return found;
 }
@@ -101,12 +90,18 @@ std::vector<int32_t> BorderStitcher::VerticesWithSeveralGaps() const {
 void BorderStitcher::Drop(const std::vector<uint8_t>& drop) {
   MW_CHECK(drop.size() == vertices_.size());
   for (Corner& corner : corners_) {
-    if (drop[static_cast<size_t>(corner.vertex)] != 0) corner.open = false;
+    if (drop[static_cast<size_t>(corner.vertex)] != 0 && corner.open) Close(corner);
   }
 }
 
+void BorderStitcher::Close(Corner& corner) {
+  corner.open = false;
+  --open_at_vertex_[static_cast<size_t>(corner.vertex)];
+}
+
 void BorderStitcher::FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found) {
-  const int level = static_cast<int>(std::ceil(std::log2(radius)));
+  int level = 0;
+  std::frexp(radius, &level);  // radius < 2^level
   const double width = std::ldexp(1.0, level);
   const auto cell_of = [&](const Eigen::Vector3d& at) {
     std::array<int32_t, 3> cell;
@@ -119,20 +114,30 @@ void BorderStitcher::FindNearby(const Eigen::Vector3d& x, double radius, std::ve
   auto [grid, is_new] = grids_.try_emplace(level);
   if (is_new) {
     for (size_t v = 0; v < vertices_.size(); ++v) {
-      if (vertices_[v].spacing <= width) {
+      if (open_at_vertex_[v] > 0 && vertices_[v].spacing <= width) {
         grid->second[cell_of(vertices_[v].position.cast<double>())].push_back(static_cast<int32_t>(v));
       }
     }
   }
   found.clear();
-  const auto [cx, cy, cz] = cell_of(x);
-  for (int32_t z = cz - 1; z <= cz + 1; ++z) {
-    for (int32_t y = cy - 1; y <= cy + 1; ++y) {
-      for (int32_t i = cx - 1; i <= cx + 1; ++i) {
-        const auto cell = grid->second.find({i, y, z});
+  const std::array<int32_t, 3> low = cell_of(x - Eigen::Vector3d::Constant(radius));
+  const std::array<int32_t, 3> high = cell_of(x + Eigen::Vector3d::Constant(radius));
+  std::array<int32_t, 3> at = low;
+  for (at[2] = low[2]; at[2] <= high[2]; ++at[2]) {
+    for (at[1] = low[1]; at[1] <= high[1]; ++at[1]) {
+      for (at[0] = low[0]; at[0] <= high[0]; ++at[0]) {
+        const auto cell = grid->second.find(at);
         if (cell == grid->second.end()) continue;
-        for (const int32_t v : cell->second) {
+        std::vector<int32_t>& members = cell->second;
+        for (size_t m = 0; m < members.size();) {
+          const int32_t v = members[m];
+          if (open_at_vertex_[static_cast<size_t>(v)] == 0) {  // never again
+            members[m] = members.back();
+            members.pop_back();
+            continue;
+          }
           if ((Position(v) - x).squaredNorm() <= radius * radius) found.push_back(v);
+          ++m;
         }
       }
     }
@@ -171,8 +176,8 @@ bool BorderStitcher::Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, 
     if (!InSector(Normal(c), frame.b - x, frame.a - x, next - x)) return false;
   }
   const Eigen::Vector2d at = frame.Project(x);
-  if (!before && frame.IsBlocked({0, 0}, frame.a_vertex, at, c)) return false;
-  return after || !frame.IsBlocked(frame.Project(frame.b), frame.b_vertex, at, c);
+  if (!before && IsBlocked({0, 0}, frame.a_vertex, at, c)) return false;
+  return after || !IsBlocked(frame.Project(frame.b), frame.b_vertex, at, c);
 }
 
 BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& scope) {
@@ -186,21 +191,16 @@ BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& sco
   if (!(length > 0)) return {};
   frame.y_axis = (frame.b - frame.a).cross(frame.normal).normalized();
   frame.x_axis = frame.normal.cross(frame.y_axis).normalized();
-  const double spacing =
-      std::max<double>(Vertex(frame.a_vertex).spacing, Vertex(frame.b_vertex).spacing);
+  const double spacing = std::max<double>(Vertex(frame.a_vertex).spacing, Vertex(frame.b_vertex).spacing);
   const double reach = scope.reach * spacing;
   const std::vector<int32_t>* around = scope.members;
   if (around == nullptr) {
-    FindNearby(0.5 * (frame.a + frame.b), 2 * reach + length, nearby_);
+    FindNearby(0.5 * (frame.a + frame.b), 2 * reach, nearby_);
     around = &nearby_;
   }
 
-  struct Apex {
-    double cosine;
-    double cost;
-    int32_t corner;
-  };
-  std::vector<Apex> apexes;
+  blockers_.clear();
+  apexes_.clear();
   for (const int32_t v : *around) {
     if (!(Normal(v).dot(frame.normal) > kMinSheetCosine)) continue;
     const Eigen::Vector3d x = Position(v);
@@ -216,22 +216,23 @@ BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& sco
     for (int32_t corner = v; corner >= 0; corner = At(corner).sibling) {
       if (!At(corner).open) continue;
       const int32_t next = VertexOf(At(corner).next);
-      frame.blockers.push_back({at, frame.Project(Position(next)), v, next});
+      const Eigen::Vector2d next_at = frame.Project(Position(next));
+      if (at.y() > 0 || next_at.y() > 0) blockers_.push_back({at, next_at, v, next});
       if (apex.cosine < 1 && apex.cost <= scope.reach) {
         apex.corner = corner;
-        apexes.push_back(apex);
+        apexes_.push_back(apex);
       }
     }
   }
-  std::ranges::sort(apexes, {}, [](const Apex& apex) { return std::pair(apex.cosine, apex.corner); });
-  for (const Apex& apex : apexes) {
+  std::ranges::sort(apexes_, {}, [](const Apex& apex) { return std::pair(apex.cosine, apex.corner); });
+  for (const Apex& apex : apexes_) {
     if (Fits(frame, edge, apex.corner, scope)) return {apex.cost, apex.corner};
   }
   return {};
 }
 
-// Puts the triangle over `edge` whose apex is `corner`. `changed` gets the open edges that are new or bear a new number,
-// and those beside them.
+// Puts the triangle over `edge` whose apex is `corner`. `changed` gets the open edges that are new or bear a new
+// number.
 void BorderStitcher::Apply(int32_t edge, int32_t corner, std::vector<int32_t>& changed) {
   const int32_t end = At(edge).next;
   const int32_t a = VertexOf(edge);
@@ -242,30 +243,31 @@ void BorderStitcher::Apply(int32_t edge, int32_t corner, std::vector<int32_t>& c
   const bool before = At(edge).previous == corner;
   changed.clear();
   if (after && before) {
-    At(edge).open = At(end).open = At(corner).open = false;
+    for (const int32_t closed : {edge, end, corner}) Close(At(closed));
   } else if (after) {
-    At(end).open = false;
+    Close(At(end));
     At(edge).next = corner;
     At(corner).previous = edge;
     AddEdge(a, c);
-    changed = {edge, At(edge).previous, corner};
+    changed = {edge};
   } else if (before) {
-    At(edge).open = false;
+    Close(At(edge));
     At(corner).next = end;
     At(end).previous = corner;
     AddEdge(c, b);
-    changed = {corner, At(corner).previous, end};
+    changed = {corner};
   } else {
     const auto twin = static_cast<int32_t>(corners_.size());
     corners_.push_back({.vertex = c, .previous = edge, .next = At(corner).next, .sibling = At(corner).sibling});
     At(corner).sibling = twin;
+    ++open_at_vertex_[static_cast<size_t>(c)];
     At(At(twin).next).previous = twin;
     At(edge).next = twin;
     At(corner).next = end;
     At(end).previous = corner;
     AddEdge(a, c);
     AddEdge(c, b);
-    changed = {edge, corner, twin, At(edge).previous, end, At(corner).previous};
+    changed = {edge, corner, twin};
   }
 }
 
@@ -305,6 +307,7 @@ void BorderStitcher::StitchNearby(double reach) {
   std::vector<int32_t> edges(corners_.size());
   for (size_t i = 0; i < edges.size(); ++i) edges[i] = static_cast<int32_t>(i);
   Advance(edges, {.reach = reach, .min_normal_cosine = kMinSeamNormalCosine});
+  grids_.clear();
 }
 
 // A loop of open edges around a hole, and the borders of islands in it.
@@ -378,7 +381,9 @@ int64_t BorderStitcher::FillHoles(double max_width) {
                            .min_normal_cosine = kMinHoleNormalCosine,
                            .members = &members});
   }
-  return static_cast<int64_t>(holes.size());
+  return std::ranges::count_if(holes, [&](const Hole& hole) {
+    return std::ranges::none_of(hole.corners, [&](int32_t corner) { return At(corner).open; });
+  });
 }
 
 }  // namespace meshwright

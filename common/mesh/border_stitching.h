@@ -70,12 +70,25 @@ class BorderStitcher {
     double min_normal_cosine = 0;
     const std::vector<int32_t>* members = nullptr;  // vertices; null: all in the neighbourhood
   };
+  // A vertex over an edge: the best one sees it under the widest angle.
+  struct Apex {
+    double cosine = 0;
+    double cost = 0;
+    int32_t corner = -1;
+  };
+  struct Segment {  // an open edge in the plane of an EdgeFrame
+    Eigen::Vector2d from, to;
+    int32_t from_vertex = 0;
+    int32_t to_vertex = 0;
+  };
   struct EdgeFrame;
   struct Hole;
 
   Candidate BestFor(int32_t edge, const Scope& scope);
   bool Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope) const;
   bool InGap(int32_t corner, int32_t vertex) const;
+  bool IsBlocked(const Eigen::Vector2d& from, int32_t from_vertex, const Eigen::Vector2d& to, int32_t to_vertex) const;
+  void Close(Corner& corner);
   bool HasEdge(int32_t v, int32_t w) const;
   void AddEdge(int32_t v, int32_t w);
   void Apply(int32_t edge, int32_t corner, std::vector<int32_t>& changed);
@@ -91,13 +104,16 @@ class BorderStitcher {
   Eigen::Vector3d Normal(int32_t v) const { return Vertex(v).normal.cast<double>(); }
 
   std::vector<BorderVertex> vertices_;
-  std::vector<Corner> corners_;  // corner v is the first one of vertex v
+  std::vector<Corner> corners_;          // corner v is the first one of vertex v
+  std::vector<int32_t> open_at_vertex_;  // how many of its corners are open
   std::vector<Face> faces_;
   absl::flat_hash_set<std::pair<int32_t, int32_t>> edges_;
-  // Vertices in cubes of the grids of width 2^level; each grid is made when first asked for.
-  struct Grid;
+  // Vertices in cubes of width 2^level; each grid is made when first asked for.
   absl::flat_hash_map<int, absl::flat_hash_map<std::array<int32_t, 3>, std::vector<int32_t>>> grids_;
-  std::vector<int32_t> nearby_;  // scratch
+  // Of the edge that is looked at; members so that their memory is kept.
+  std::vector<int32_t> nearby_;
+  std::vector<Segment> blockers_;
+  std::vector<Apex> apexes_;
 };
 
 }  // namespace meshwright

@@ -207,10 +207,10 @@ std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders,
   const size_t count = borders.vertices.size();
   std::vector<int32_t> part_of(count, 0);
   for (size_t part = 0; part + 1 < borders.parts.size(); ++part) {
-    std::fill(part_of.begin() + borders.parts[part].first_border, part_of.begin() + borders.parts[part + 1].first_border,
-              static_cast<int32_t>(part));
+    std::fill(part_of.begin() + borders.parts[part].first_border,
+              part_of.begin() + borders.parts[part + 1].first_border, static_cast<int32_t>(part));
   }
-  std::vector<Eigen::Vector4f> sum(count, Eigen::Vector4f::Zero());
+  std::vector<Eigen::Vector3f> sum(count, Eigen::Vector3f::Zero());
   std::vector<float> weight(count, 0);
   for (size_t f = 0; f < faces.size(); ++f) {
     if (is_stitch[f] == 0) continue;
@@ -219,13 +219,11 @@ std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders,
         const auto v = static_cast<size_t>(i);
         const auto w = static_cast<size_t>(j);
         if (part_of[v] == part_of[w]) continue;
-        Eigen::Vector4f offset;
+        Eigen::Vector3f offset;
         for (int k = 0; k < 3; ++k) {
           offset[k] = static_cast<float>(borders.origins[w].color[static_cast<size_t>(k)]) -
                       static_cast<float>(borders.origins[v].color[static_cast<size_t>(k)]);
         }
-        const Eigen::Vector3f normal = (borders.vertices[v].normal + borders.vertices[w].normal).normalized();
-        offset[3] = (borders.vertices[w].position - borders.vertices[v].position).dot(normal);
         sum[v] += offset;
         weight[v] += 1;
       }
@@ -236,7 +234,7 @@ std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders,
   for (size_t v = 0; v < count; ++v) previous[static_cast<size_t>(borders.vertices[v].next)] = static_cast<int32_t>(v);
   for (size_t v = 0; v < count; ++v) {
     if (weight[v] == 0) continue;
-    Eigen::Vector4f total = sum[v];
+    Eigen::Vector3f total = sum[v];
     float total_weight = weight[v];
     size_t before = v;
     size_t after = v;
@@ -247,7 +245,7 @@ std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders,
       total_weight += weight[before] + weight[after];
     }
     total *= 0.5F / total_weight;
-    offsets[v] = SeamOffset{borders.origins[v].node, total.head<3>(), total[3]};
+    offsets[v] = SeamOffset{borders.origins[v].node, total};
   }
   return offsets;
 }

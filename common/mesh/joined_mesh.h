@@ -16,7 +16,7 @@ struct JoinOptions {
   int64_t min_component_faces = 100;
   // Holes up to this wide with a nearly flat rim are closed. Lattice steps, 0 .. 1000.
   double max_hole_steps = 30;
-  // How far from a seam the parts' colours and depths run into each other. Lattice steps, 0 .. 1000.
+  // How far from a seam the parts' colours run into each other. Lattice steps, 0 .. 1000.
   int blend_steps = 16;
 
   absl::Status Validate() const;
@@ -36,9 +36,9 @@ struct JoinedMeshCounts {
 
 // Joins the accepted surfaces 0 .. count - 1 (M_r of section 3.7, Jancosek et al. 2009, which leaves them side by side)
 // into one mesh and writes it as PLY. Where surfaces overlap, the earlier one stays. Borders that come close are
-// stitched, holes filled, small pieces left out, colours and depths run into each other at the seams. Every edge has
-// one or two triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their order
-// alone, not on the threads.
+// stitched, holes filled, small pieces left out, colours run into each other at the seams; positions stay. Every edge
+// has one or two triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their
+// order alone, not on the threads.
 //
 // Loads each surface about twice, a few at a time, and keeps the vertices on borders of all of them (some 300 bytes
 // each, and 1/8 byte for each other patch). Errors: those of `load` or of PlyStreamWriter, InvalidArgument for options;

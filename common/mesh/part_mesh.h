@@ -13,10 +13,10 @@ namespace meshwright {
 struct PartMesh {
   static constexpr int32_t kInterior = -1;
 
-  std::vector<int32_t> node_of_vertex;         // ascending
-  std::vector<std::array<int32_t, 3>> faces;   // vertices, counter-clockwise seen from the camera
-  std::vector<int32_t> next_on_border;         // per vertex: where the border goes on, the triangle to its left
-  std::vector<int32_t> component_of_vertex;    // numbered by their first vertices
+  std::vector<int32_t> node_of_vertex;        // ascending
+  std::vector<std::array<int32_t, 3>> faces;  // vertices, counter-clockwise seen from the camera
+  std::vector<int32_t> next_on_border;        // per vertex: where the border goes on, the triangle to its left
+  std::vector<int32_t> component_of_vertex;   // numbered by their first vertices
   std::vector<int64_t> faces_of_component;
 };
 

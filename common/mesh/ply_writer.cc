@@ -168,9 +168,8 @@ absl::Status PlyStreamWriter::AppendFaces(absl::Span<const std::array<uint32_t, 
   for (const auto& face : faces) {
     for (const uint32_t corner : face) MW_CHECK(static_cast<int64_t>(corner) < vertices_);
   }
-  MW_RETURN_IF_ERROR(WriteFaces(faces, 0, [&](absl::Span<const uint8_t> bytes) {
-    return WriteToTemporary(faces_descriptor_, bytes, path_);
-  }));
+  MW_RETURN_IF_ERROR(WriteFaces(
+      faces, 0, [&](absl::Span<const uint8_t> bytes) { return WriteToTemporary(faces_descriptor_, bytes, path_); }));
   faces_ += static_cast<int64_t>(faces.size());
   return absl::OkStatus();
 }

@@ -9,15 +9,14 @@
 
 namespace meshwright {
 
-// What a node on a seam has to give to meet the other side half-way.
+// By how much the colour of a node on a seam has to change to meet the other side half-way.
 struct SeamOffset {
   int32_t node = 0;
   Eigen::Vector3f color = Eigen::Vector3f::Zero();  // grey levels per channel
-  float displacement = 0;                           // scene units along the normal
 };
 
 // Carries the offsets from the seam along linked patches, averaged from ring to ring and fading out within `steps`
-// rings, into the surface's colours and depths.
+// rings, into the surface's colours.
 void BlendSeams(const std::vector<SeamOffset>& offsets, int steps, PatchLattice& surface);
 
 }  // namespace meshwright
