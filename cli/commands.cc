@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <thread>
 
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 #include "common/scene/import.h"
 
 namespace meshwright {

@@ -5,7 +5,7 @@
 
 #include <absl/strings/str_format.h>
 
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 
 namespace meshwright {
 namespace {

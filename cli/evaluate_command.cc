@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "cli/commands.h"
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
 #include "common/evaluation/evaluation.h"

@@ -5,7 +5,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "cli/commands.h"
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 #include "cli/local/inspection.h"
 #include "cli/local/reconstruction_options.h"
 #include "common/base/thread_pool.h"

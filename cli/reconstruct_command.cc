@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 #include "cli/local/local_reconstruction.h"
 #include "cli/progress_display.h"
 #include "common/base/clock.h"

@@ -4,7 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "cli/commands.h"
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
 #include "common/image/encode.h"

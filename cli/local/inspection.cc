@@ -6,8 +6,8 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
-#include "cli/local/failure.h"
-#include "cli/local/view_cache.h"
+#include "common/base/bad_input.h"
+#include "worker/job_input/view_cache.h"
 #include "common/base/status_macros.h"
 #include "common/scene/view.h"
 

@@ -7,12 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include <absl/time/clock.h>
-
-#include "cli/local/report.h"
 #include "common/base/check.h"
 #include "common/base/status_macros.h"
-#include "common/surface/codec.h"
 
 namespace meshwright {
 
@@ -86,24 +82,10 @@ void JobRunner::Work(Shared& shared, const std::function<void(const CameraJobRep
 }
 
 absl::StatusOr<CameraJobReport> JobRunner::Process(const CameraJobSpec& spec) {
-  CameraJobReport report;
-  std::vector<CameraIndex> weak_targets;
-  std::string filtered_digest;
-  double seconds_loading = 0;
-  {
-    MW_ASSIGN_OR_RETURN(CameraJobInputMaker::Prepared prepared, inputs_.Make(spec, pool_));
-    CameraJobResult result = job_(prepared.input, pool_);
-    result.report.seconds_visibility = prepared.seconds_visibility;
-    seconds_loading = prepared.seconds_loading;
-    report = result.report;
-    weak_targets = std::move(result.weak_targets);
-    prepared = {};
-    MW_ASSIGN_OR_RETURN(filtered_digest, blobs_.Put(EncodeSurface(result.filtered)));
-  }
-  // The surface is durable; photographs and lattices are gone before acceptance loads others.
-  MW_RETURN_IF_ERROR(conductor_.Complete(spec.sequence, spec.epoch, filtered_digest, weak_targets,
-                                         MakeJobReport(scene_, spec, report, seconds_loading).dump()));
-  return report;
+  MW_ASSIGN_OR_RETURN(const FinishedJob done, RunJob(scene_, spec, inputs_, job_, blobs_, pool_));
+  MW_RETURN_IF_ERROR(
+      conductor_.Complete(spec.sequence, spec.epoch, done.filtered_digest, done.weak_targets, done.report_json));
+  return done.report;
 }
 
 }  // namespace meshwright

@@ -5,17 +5,15 @@
 
 #include <absl/status/status.h>
 
-#include "cli/local/camera_job_input.h"
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
 #include "common/scene/scene.h"
 #include "coordinator/conductor/conductor.h"
 #include "worker/camera_job/camera_job.h"
+#include "worker/job_input/camera_job_input.h"
+#include "worker/job_input/run_job.h"
 
 namespace meshwright {
-
-// What does a camera job; RunCameraJob, or something quick in tests.
-using CameraJobFunction = std::function<CameraJobResult(const CameraJobInput&, ThreadPool&)>;
 
 struct JobRunnerSettings {
   int concurrent_jobs = 1;         // jobs that may run at the same time, >= 1

@@ -11,10 +11,10 @@
 #include <absl/strings/str_format.h>
 #include <absl/time/clock.h>
 
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 #include "cli/local/report.h"
-#include "cli/local/scene_check.h"
-#include "cli/local/view_cache.h"
+#include "common/scene/scene_check.h"
+#include "worker/job_input/view_cache.h"
 #include "cli/local/work_folder.h"
 #include "common/base/clock.h"
 #include "common/base/files.h"

@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 #include "common/base/check.h"
 #include "common/base/files.h"
 #include "common/image/encode.h"

@@ -1,6 +1,5 @@
 #include "cli/local/report.h"
 
-#include <algorithm>
 #include <vector>
 
 #include "common/base/status_macros.h"
@@ -14,11 +13,6 @@ double Share(int64_t part, int64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
-// Seconds need no more digits than microseconds.
-double Rounded(double seconds) {
-  return std::max(0.0, 1e-6 * static_cast<double>(static_cast<int64_t>(1e6 * seconds)));
-}
-
 const std::string& NameOf(const Scene& scene, CameraIndex camera) {
   return scene.views[static_cast<size_t>(camera)].name;
 }
@@ -29,32 +23,6 @@ int64_t IntegerAt(const Json& json, const char* key) {
 }
 
 }  // namespace
-
-Json MakeJobReport(const Scene& scene, const CameraJobSpec& spec, const CameraJobReport& report,
-                   double seconds_loading) {
-  Json targets = Json::array();
-  for (const CameraIndex target : spec.targets) targets.push_back(NameOf(scene, target));
-  Json json;
-  json["neighbours"] = spec.neighbours.size();
-  json["targets"] = std::move(targets);
-  json["seeds"] = report.seeds;
-  json["seeds_from_points"] = report.seeds_from_points;
-  json["tentative_patches_scored"] = report.tentative_patches_scored;
-  json["patches_grown"] = report.patches_grown;
-  json["rays"] = report.rays;
-  json["rays_covered_before"] = report.rays_covered_before;
-  json["rays_grown"] = report.rays_grown;
-  json["rays_filtered"] = report.rays_filtered;
-  json["mrf_energy"] = report.mrf_energy;
-  json["mrf_lower_bound"] = report.mrf_lower_bound;
-  json["seconds"] = {{"loading", Rounded(seconds_loading)},
-                     {"visibility", Rounded(report.seconds_visibility)},
-                     {"seeding", Rounded(report.seconds_seeding)},
-                     {"growing", Rounded(report.seconds_growing)},
-                     {"filtering", Rounded(report.seconds_filtering)},
-                     {"refinement", Rounded(report.seconds_refinement)}};
-  return json;
-}
 
 absl::StatusOr<Json> MakeCamerasReport(const Scene& scene, JobStore& store, const std::string& reconstruction_id,
                                        ReportTotals* totals) {

@@ -7,15 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "common/scene/scene.h"
-#include "coordinator/conductor/conductor.h"
 #include "coordinator/store/job_store.h"
-#include "worker/camera_job/camera_job.h"
 
 namespace meshwright {
-
-// What is kept in the store about one finished job.
-nlohmann::ordered_json MakeJobReport(const Scene& scene, const CameraJobSpec& spec, const CameraJobReport& report,
-                                     double seconds_loading);
 
 // Sums over cameras that tell how much work the order rule and the suppression by accepted surfaces left to do.
 struct ReportTotals {

@@ -8,6 +8,7 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
+#include "common/base/files.h"
 #include "common/base/status_macros.h"
 #include "common/image/decode.h"
 #include "common/image/remap.h"
@@ -54,7 +55,12 @@ Camera UndistortedCamera(const SceneView& view, int max_image_size) {
 }
 
 absl::StatusOr<View> LoadView(const SceneView& view, int max_image_size) {
-  MW_ASSIGN_OR_RETURN(ColorImage image, DecodeImage(view.image_path));
+  MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(view.image_path));
+  return DecodeView(view, bytes, max_image_size);
+}
+
+absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& picture_bytes, int max_image_size) {
+  MW_ASSIGN_OR_RETURN(ColorImage image, DecodeImageBytes(picture_bytes, view.image_path));
   if (image.width != view.lens.width || image.height != view.lens.height) {
     return absl::InvalidArgumentError(absl::StrCat(view.image_path, ": the picture has ", image.width, " x ",
                                                    image.height, " px; its camera expects ", view.lens.width, " x ",

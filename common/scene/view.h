@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include <absl/status/statusor.h>
 
@@ -24,5 +25,8 @@ struct View {
 // Decodes view.image_path (EXIF rotation ignored), checks its size against the lens, undistorts and scales.
 // Errors name the file and what was expected: NotFound, InvalidArgument (not a picture, truncated, wrong size).
 absl::StatusOr<View> LoadView(const SceneView& view, int max_image_size);
+
+// The same for a picture's bytes, wherever they come from; view.image_path stands for the file in errors.
+absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& picture_bytes, int max_image_size);
 
 }  // namespace meshwright

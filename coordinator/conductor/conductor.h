@@ -15,6 +15,7 @@
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
 #include "common/geometry/camera.h"
+#include "common/job/camera_job_spec.h"
 #include "common/scene/scene.h"
 #include "coordinator/acceptance/acceptance.h"
 #include "coordinator/incidence/feasible_pairs.h"
@@ -34,26 +35,6 @@ struct ConductorOptions {
   AcceptanceOptions acceptance;           // its k_a is also the K_a of the order rule
 
   absl::Status Validate() const;
-};
-
-// One accepted surface M_r in the BlobStore.
-struct AcceptedSurface {
-  SequenceNumber sequence = 0;
-  CameraIndex camera = 0;
-  std::string digest;
-  int64_t patches = 0;
-};
-
-// What a worker needs to know to process one reference camera.
-struct CameraJobSpec {
-  SequenceNumber sequence = 0;
-  CameraIndex camera = 0;
-  SequenceNumber snapshot = 0;
-  int64_t epoch = 1;                      // to be named with the result
-  std::vector<CameraIndex> neighbours;    // O_r as of the snapshot, ascending
-  std::vector<CameraIndex> targets;       // the chosen part of it, best first
-  std::vector<AcceptedSurface> accepted;  // what may hide something from r: accepted in commits <= snapshot by cameras
-                                          // that overlap r; by camera. V_r is made of these
 };
 
 struct Progress {

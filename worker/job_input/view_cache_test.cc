@@ -1,4 +1,4 @@
-#include "cli/local/view_cache.h"
+#include "worker/job_input/view_cache.h"
 
 #include <atomic>
 #include <thread>

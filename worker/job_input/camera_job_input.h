@@ -5,13 +5,13 @@
 
 #include <absl/status/statusor.h>
 
-#include "cli/local/view_cache.h"
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
 #include "common/geometry/camera.h"
+#include "common/job/camera_job_spec.h"
 #include "common/scene/scene.h"
-#include "coordinator/conductor/conductor.h"
 #include "worker/camera_job/camera_job.h"
+#include "worker/job_input/view_cache.h"
 
 namespace meshwright {
 

@@ -1,4 +1,4 @@
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 
 #include <absl/strings/cord.h>
 

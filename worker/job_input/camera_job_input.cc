@@ -1,11 +1,11 @@
-#include "cli/local/camera_job_input.h"
+#include "worker/job_input/camera_job_input.h"
 
 #include <utility>
 
 #include <absl/strings/str_cat.h>
 #include <absl/time/clock.h>
 
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 #include "common/base/status_macros.h"
 #include "common/surface/codec.h"
 

@@ -1,4 +1,4 @@
-#include "cli/local/scene_check.h"
+#include "common/scene/scene_check.h"
 
 #include <cstring>
 #include <mutex>
@@ -7,7 +7,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/types/span.h>
 
-#include "cli/local/failure.h"
+#include "common/base/bad_input.h"
 #include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
