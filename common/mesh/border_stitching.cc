@@ -15,7 +15,13 @@ namespace {
 
 // A triangle across a seam climbs the parts' difference in depth, so it may lean more than the parts themselves do.
 constexpr double kMinSeamNormalCosine = 0.3;
-constexpr double kMinHoleNormalCosine = 0.4;
+// In a hole triangles keep to the hole's plane.
+constexpr double kMinHoleNormalCosine = 0.2;
+// A hole this narrow is a crack in one surface, however its rim is turned. Times the spacing.
+constexpr double kSlitWidth = 6;
+constexpr double kMinSlitCosine = 0.05;
+// So many of a wider hole's rim vertices must lie near its plane.
+constexpr double kMinFlatShare = 0.9;
 // Vertices whose normals differ more belong to another sheet.
 constexpr double kMinSheetCosine = 0.5;
 
@@ -145,13 +151,13 @@ void BorderStitcher::FindNearby(const Eigen::Vector3d& x, double radius, std::ve
 }
 
 // Whether the edge from the corner's vertex to `vertex` starts in the corner's gap.
-bool BorderStitcher::InGap(int32_t corner, int32_t vertex) const {
+bool BorderStitcher::InGap(int32_t corner, int32_t vertex, const Scope& scope) const {
   const Corner& at = At(corner);
   const int32_t previous = VertexOf(at.previous);
   const int32_t next = VertexOf(at.next);
   if (vertex == previous || vertex == next) return true;
   const Eigen::Vector3d x = Position(at.vertex);
-  return InSector(Normal(at.vertex), Position(previous) - x, Position(vertex) - x, Position(next) - x);
+  return InSector(NormalFor(at.vertex, scope), Position(previous) - x, Position(vertex) - x, Position(next) - x);
 }
 
 bool BorderStitcher::Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope) const {
@@ -164,16 +170,16 @@ bool BorderStitcher::Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, 
   const Eigen::Vector3d x = Position(c);
   const Eigen::Vector3d normal = (frame.a - frame.b).cross(x - frame.b).normalized();
   for (const int32_t v : {frame.a_vertex, frame.b_vertex, c}) {
-    if (!(normal.dot(Normal(v)) > scope.min_normal_cosine)) return false;
+    if (!(normal.dot(NormalFor(v, scope)) > scope.min_normal_cosine)) return false;
   }
-  if (!before && !InGap(edge, c)) return false;
-  if (!after && !InGap(end, c)) return false;
-  if (!before && !InGap(corner, frame.a_vertex)) return false;
-  if (!after && !InGap(corner, frame.b_vertex)) return false;
+  if (!before && !InGap(edge, c, scope)) return false;
+  if (!after && !InGap(end, c, scope)) return false;
+  if (!before && !InGap(corner, frame.a_vertex, scope)) return false;
+  if (!after && !InGap(corner, frame.b_vertex, scope)) return false;
   if (!before && !after) {
     // Counter-clockwise around c: its previous vertex, b, a, its next vertex.
     const Eigen::Vector3d next = Position(VertexOf(At(corner).next));
-    if (!InSector(Normal(c), frame.b - x, frame.a - x, next - x)) return false;
+    if (!InSector(NormalFor(c, scope), frame.b - x, frame.a - x, next - x)) return false;
   }
   const Eigen::Vector2d at = frame.Project(x);
   if (!before && IsBlocked({0, 0}, frame.a_vertex, at, c)) return false;
@@ -186,7 +192,7 @@ BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& sco
   frame.b_vertex = VertexOf(At(edge).next);
   frame.a = Position(frame.a_vertex);
   frame.b = Position(frame.b_vertex);
-  frame.normal = (Normal(frame.a_vertex) + Normal(frame.b_vertex)).normalized();
+  frame.normal = (NormalFor(frame.a_vertex, scope) + NormalFor(frame.b_vertex, scope)).normalized();
   const double length = (frame.b - frame.a).norm();
   if (!(length > 0)) return {};
   frame.y_axis = (frame.b - frame.a).cross(frame.normal).normalized();
@@ -202,7 +208,7 @@ BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& sco
   blockers_.clear();
   apexes_.clear();
   for (const int32_t v : *around) {
-    if (!(Normal(v).dot(frame.normal) > kMinSheetCosine)) continue;
+    if (!(NormalFor(v, scope).dot(frame.normal) > kMinSheetCosine)) continue;
     const Eigen::Vector3d x = Position(v);
     const Eigen::Vector2d at = frame.Project(x);
     Apex apex = {2, 0, -1};
@@ -350,12 +356,15 @@ std::vector<BorderStitcher::Hole> BorderStitcher::FindHoles(double max_width) co
       continue;
     }
     loop.normal = -area.normalized();
-    const bool is_flat = std::ranges::all_of(loop.corners, [&](int32_t corner) {
+    const bool is_slit =
+        2 * loop.radius <= kSlitWidth * spacing && normals.normalized().dot(loop.normal) > kMinSlitCosine;
+    const auto fits = [&](int32_t corner) {
       const int32_t v = VertexOf(corner);
       return Normal(v).dot(loop.normal) > kMinSheetCosine &&
              std::abs((Position(v) - loop.center).dot(loop.normal)) < 0.5 * loop.radius + 1.5 * spacing;
-    });
-    if (is_flat) holes.push_back(std::move(loop));
+    };
+    const bool is_flat = static_cast<double>(std::ranges::count_if(loop.corners, fits)) >= kMinFlatShare * count;
+    if (is_slit || is_flat) holes.push_back(std::move(loop));
   }
   for (const Hole& island : islands) {
     for (Hole& hole : holes) {
@@ -379,7 +388,8 @@ int64_t BorderStitcher::FillHoles(double max_width) {
     members.erase(std::unique(members.begin(), members.end()), members.end());
     Advance(hole.corners, {.reach = std::numeric_limits<double>::infinity(),
                            .min_normal_cosine = kMinHoleNormalCosine,
-                           .members = &members});
+                           .members = &members,
+                           .normal = &hole.normal});
   }
   return std::ranges::count_if(holes, [&](const Hole& hole) {
     return std::ranges::none_of(hole.corners, [&](int32_t corner) { return At(corner).open; });

@@ -39,8 +39,8 @@ class BorderStitcher {
   // Takes the borders of all vertices with drop[vertex] out of the game.
   void Drop(const std::vector<uint8_t>& drop);
 
-  // Fills loops around holes of at most `max_width` times the vertices' spacing whose rims are nearly flat, together
-  // with the islands in them. Returns how many.
+  // Fills loops around holes of at most `max_width` times the vertices' spacing, together with the islands in them:
+  // slits whatever their rims look like, wider holes where the rims are nearly flat. Returns how many.
   int64_t FillHoles(double max_width);
 
   const std::vector<BorderVertex>& vertices() const { return vertices_; }
@@ -69,6 +69,7 @@ class BorderStitcher {
     double reach = 0;
     double min_normal_cosine = 0;
     const std::vector<int32_t>* members = nullptr;  // vertices; null: all in the neighbourhood
+    const Eigen::Vector3d* normal = nullptr;        // of the plane to work in; null: that of the vertices
   };
   // A vertex over an edge: the best one sees it under the widest angle.
   struct Apex {
@@ -86,7 +87,9 @@ class BorderStitcher {
 
   Candidate BestFor(int32_t edge, const Scope& scope);
   bool Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope) const;
-  bool InGap(int32_t corner, int32_t vertex) const;
+  bool InGap(int32_t corner, int32_t vertex, const Scope& scope) const;
+  // Outwards at a vertex.
+  Eigen::Vector3d NormalFor(int32_t v, const Scope& scope) const { return scope.normal ? *scope.normal : Normal(v); }
   bool IsBlocked(const Eigen::Vector2d& from, int32_t from_vertex, const Eigen::Vector2d& to, int32_t to_vertex) const;
   void Close(Corner& corner);
   bool HasEdge(int32_t v, int32_t w) const;

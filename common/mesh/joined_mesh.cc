@@ -178,7 +178,16 @@ absl::StatusOr<Borders> LookAtParts(int64_t count, const LoadSurface& load, Thre
   return borders;
 }
 
-// Per component of a part: whether what it is stitched to has too few faces.
+// Border vertices of triangles without neighbours. They are noise, and to a stitcher their outside looks like a hole.
+std::vector<uint8_t> LoneTriangles(const Borders& borders) {
+  std::vector<uint8_t> lone(borders.origins.size());
+  for (size_t v = 0; v < lone.size(); ++v) {
+    lone[v] = borders.faces_of_component[static_cast<size_t>(borders.origins[v].component)] == 1 ? 1 : 0;
+  }
+  return lone;
+}
+
+// Per component of a part: whether what it is stitched to has too few faces. A lone triangle always has.
 std::vector<uint8_t> SmallComponents(const Borders& borders, const std::vector<BorderStitcher::Face>& faces,
                                      int64_t min_faces, int64_t& removed) {
   const size_t components = borders.faces_of_component.size();
@@ -194,17 +203,17 @@ std::vector<uint8_t> SmallComponents(const Borders& borders, const std::vector<B
   for (const auto& face : faces) ++total[root_of(static_cast<size_t>(component_of(face[0])))];
   std::vector<uint8_t> small(components, 0);
   for (size_t c = 0; c < components; ++c) {
-    small[c] = total[root_of(c)] < min_faces ? 1 : 0;
+    small[c] = total[root_of(c)] < std::max<int64_t>(min_faces, 2) ? 1 : 0;
     if (small[c] != 0 && root_of(c) == c) ++removed;
   }
   return small;
 }
 
 // Half of what separates each vertex from those of other parts that it is stitched to.
-std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders,
+std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders, const std::vector<BorderVertex>& vertices,
                                                    const std::vector<BorderStitcher::Face>& faces,
                                                    const std::vector<uint8_t>& is_stitch) {
-  const size_t count = borders.vertices.size();
+  const size_t count = vertices.size();
   std::vector<int32_t> part_of(count, 0);
   for (size_t part = 0; part + 1 < borders.parts.size(); ++part) {
     std::fill(part_of.begin() + borders.parts[part].first_border,
@@ -231,7 +240,7 @@ std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders,
   }
   std::vector<std::optional<SeamOffset>> offsets(count);
   std::vector<int32_t> previous(count, 0);
-  for (size_t v = 0; v < count; ++v) previous[static_cast<size_t>(borders.vertices[v].next)] = static_cast<int32_t>(v);
+  for (size_t v = 0; v < count; ++v) previous[static_cast<size_t>(vertices[v].next)] = static_cast<int32_t>(v);
   for (size_t v = 0; v < count; ++v) {
     if (weight[v] == 0) continue;
     Eigen::Vector3f total = sum[v];
@@ -240,7 +249,7 @@ std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders,
     size_t after = v;
     for (int k = 0; k < kSeamSmoothing; ++k) {
       before = static_cast<size_t>(previous[before]);
-      after = static_cast<size_t>(borders.vertices[after].next);
+      after = static_cast<size_t>(vertices[after].next);
       total += sum[before] + sum[after];
       total_weight += weight[before] + weight[after];
     }
@@ -350,13 +359,15 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
                                                  const std::string& path, ThreadPool& pool) {
   MW_RETURN_IF_ERROR(options.Validate());
   JoinedMeshCounts counts;
-  MW_ASSIGN_OR_RETURN(const Borders borders, LookAtParts(count, load, pool, counts));
+  MW_ASSIGN_OR_RETURN(Borders borders, LookAtParts(count, load, pool, counts));
 
-  BorderStitcher stitcher(borders.vertices, borders.inner_edges);
+  BorderStitcher stitcher(std::move(borders.vertices), borders.inner_edges);
+  borders.inner_edges = {};
+  stitcher.Drop(LoneTriangles(borders));
   stitcher.StitchNearby(kStitchReach);
   const std::vector<uint8_t> small =
       SmallComponents(borders, stitcher.faces(), options.min_component_faces, counts.components_removed);
-  std::vector<uint8_t> drop(borders.vertices.size());
+  std::vector<uint8_t> drop(borders.origins.size());
   for (size_t v = 0; v < drop.size(); ++v) drop[v] = small[static_cast<size_t>(borders.origins[v].component)];
   stitcher.Drop(drop);
   const size_t stitch_faces = stitcher.faces().size();
@@ -366,7 +377,7 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
   std::vector<BorderStitcher::Face> faces = stitcher.faces();
   std::vector<uint8_t> is_stitch(faces.size(), 0);
   std::fill(is_stitch.begin(), is_stitch.begin() + static_cast<int64_t>(stitch_faces), 1);
-  const std::vector<std::optional<SeamOffset>> offsets = SeamOffsets(borders, faces, is_stitch);
+  const std::vector<std::optional<SeamOffset>> offsets = SeamOffsets(borders, stitcher.vertices(), faces, is_stitch);
   for (size_t f = 0; f < faces.size(); ++f) {
     if (drop[static_cast<size_t>(faces[f][0])] == 0) ++(is_stitch[f] != 0 ? counts.stitch_faces : counts.hole_faces);
   }
@@ -374,8 +385,8 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
   const std::vector<int32_t> copies = SplitPoints(stitcher, faces);
 
   MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, kAttributes));
-  std::vector<uint32_t> index_of_border(borders.vertices.size() + copies.size(), 0);
-  std::vector<int32_t> copied(borders.vertices.size(), 0);
+  std::vector<uint32_t> index_of_border(borders.origins.size() + copies.size(), 0);
+  std::vector<int32_t> copied(borders.origins.size(), 0);
   for (const int32_t v : copies) ++copied[static_cast<size_t>(v)];
   TriangleMesh copied_vertices;
   std::vector<int32_t> copied_borders;
@@ -404,7 +415,7 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
   TriangleMesh copy_mesh;
   for (size_t c = 0; c < copies.size(); ++c) {
     const auto at = std::ranges::lower_bound(copied_borders, copies[c]) - copied_borders.begin();
-    index_of_border[borders.vertices.size() + c] = static_cast<uint32_t>(writer.vertices() + c);
+    index_of_border[borders.origins.size() + c] = static_cast<uint32_t>(writer.vertices() + c);
     AppendVertex(copied_vertices, static_cast<size_t>(at), copy_mesh);
   }
   MW_RETURN_IF_ERROR(writer.Append(copy_mesh));

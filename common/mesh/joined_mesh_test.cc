@@ -271,6 +271,26 @@ TEST_F(JoinedMeshTest, PiecesBelowTheThresholdVanish) {
   EXPECT_TRUE(Join({surface}, {.min_component_faces = 1'000'000}).faces.empty());
 }
 
+TEST_F(JoinedMeshTest, LoneTrianglesNeverStay) {
+  PatchLattice surface = PlaneSeenBy(0, LookAt({0, 0, 1}, {0, 0, 0}, 0), [](double x, double y) {
+    return x < 0 || (std::abs(x - 0.3) < 0.02 && std::abs(y) < 0.02);
+  });
+  int isolated = 0;
+  for (int row = 0; row < surface.lattice.rows; ++row) {
+    for (int column = 0; column < surface.lattice.columns; ++column) {
+      const int64_t node = surface.lattice.Index(column, row);
+      if (!surface.HasPatch(node) || surface.Point(column, row).x() < 0.1) continue;
+      if (isolated++ == 0) surface.links[static_cast<size_t>(node)] = 0;
+      // Normals that make the triangle's outside look like a hole.
+      surface.normal_in_world[static_cast<size_t>(node)] = {0, 0, -1};
+    }
+  }
+  ASSERT_EQ(isolated, 4);
+  const TriangleMesh mesh = Join({surface}, {.min_component_faces = 0});
+  EXPECT_EQ(CountComponents(mesh), 1);
+  EXPECT_EQ(counts_.components_removed, 1);
+}
+
 TEST_F(JoinedMeshTest, ColorsRunIntoEachOtherAtTheSeam) {
   const TriangleMesh mesh = Join({PlaneSeenBy(
                                       0, left_, [](double x, double) { return x < 0; }, 100),
