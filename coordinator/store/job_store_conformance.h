@@ -181,6 +181,7 @@ TEST_P(JobStoreConformance, ManyThreadsGetOneWinnerEach) {
   for (int s = 1; s <= kJobs; ++s) ASSERT_TRUE(store().AssignCameraJob("castle", s, s, 0, kNow).ok());
   std::vector<int> won(kThreads, 0);
   std::vector<std::thread> threads;
+  threads.reserve(kThreads);
   for (int t = 0; t < kThreads; ++t) {
     threads.emplace_back([&, t] {
       for (int s = 1; s <= kJobs; ++s) {

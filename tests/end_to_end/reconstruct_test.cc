@@ -97,7 +97,7 @@ std::string WithImagesReversed(const std::string& images_txt) {
     }
     std::string second;
     std::getline(stream, second);
-    images.push_back(line + "\n" + second + "\n");
+    images.push_back(line.append("\n").append(second).append("\n"));
   }
   std::reverse(images.begin(), images.end());
   std::string text;
