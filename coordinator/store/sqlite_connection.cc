@@ -8,6 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/base/status_macros.h"
+#include "coordinator/store/sql_database.h"
 
 namespace meshwright {
 
@@ -46,22 +47,6 @@ absl::Status SqliteError(sqlite3* connection, const std::string& path) {
   }
 }
 
-// Cuts a file of "-- name: x" sections into name -> SQL.
-std::map<std::string, std::string> ParseStatements(const std::string& text) {
-  const std::string marker = "-- name: ";
-  std::map<std::string, std::string> statements;
-  size_t at = text.find(marker);
-  while (at != std::string::npos) {
-    const size_t name_begin = at + marker.size();
-    const size_t name_end = text.find('\n', name_begin);
-    MW_CHECK(name_end != std::string::npos);
-    at = text.find(marker, name_end);
-    statements[text.substr(name_begin, name_end - name_begin)] =
-        text.substr(name_end, at == std::string::npos ? at : at - name_end);
-  }
-  return statements;
-}
-
 }  // namespace
 
 SqliteStatement::SqliteStatement(sqlite3* connection, sqlite3_stmt* statement, std::string path)
@@ -91,8 +76,7 @@ SqliteStatement& SqliteStatement::Bind(const char* name, const std::string& valu
   return *this;
 }
 
-SqliteStatement& SqliteStatement::Bind(const char* name, const std::optional<std::string>& value) {
-  if (value.has_value()) return Bind(name, *value);
+SqliteStatement& SqliteStatement::BindNull(const char* name) {
   MW_CHECK(sqlite3_bind_null(statement_, Parameter(name)) == SQLITE_OK);
   return *this;
 }
@@ -108,11 +92,8 @@ absl::StatusOr<bool> SqliteStatement::Step() {
   }
 }
 
-absl::StatusOr<int64_t> SqliteStatement::Run() {
-  MW_ASSIGN_OR_RETURN(const bool row, Step());
-  MW_CHECK(!row);
-  return sqlite3_changes64(connection_);
-}
+int SqliteStatement::Columns() const { return sqlite3_column_count(statement_); }
+int64_t SqliteStatement::Changes() const { return sqlite3_changes64(connection_); }
 
 int64_t SqliteStatement::Integer(int column) const { return sqlite3_column_int64(statement_, column); }
 
@@ -123,7 +104,8 @@ std::string SqliteStatement::Text(int column) const {
 }
 
 SqliteConnection::SqliteConnection(std::string path) : path_(std::move(path)) {
-  for (const auto& [name, text] : SqliteStatements()) statements_.merge(ParseStatements(text));
+  statements_ = ParseSqlStatements(CommonStatements());
+  statements_.merge(ParseSqlStatements(SqliteStatements()));
 }
 
 SqliteConnection::SqliteConnection(SqliteConnection&& other) noexcept
@@ -141,8 +123,9 @@ absl::StatusOr<SqliteConnection> SqliteConnection::Open(const std::string& path)
   }
   sqlite3_extended_result_codes(database.connection_, 1);
   sqlite3_busy_timeout(database.connection_, kBusyTimeoutMs);
-  MW_RETURN_IF_ERROR(database.Execute("PRAGMA foreign_keys = ON; PRAGMA synchronous = FULL;"));
+  MW_RETURN_IF_ERROR(database.Execute("PRAGMA foreign_keys = OFF; PRAGMA synchronous = FULL;"));
   MW_RETURN_IF_ERROR(database.Migrate());
+  MW_RETURN_IF_ERROR(database.Execute("PRAGMA foreign_keys = ON;"));
   // Some filesystems (network shares) cannot hold a write-ahead log; the classic journal is as safe, only slower.
   MW_RETURN_IF_ERROR(database.Execute("PRAGMA journal_mode = WAL;"));
   return database;

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <optional>
 #include <string>
 
 #include <absl/status/status.h>
@@ -25,14 +24,14 @@ class SqliteStatement {
 
   SqliteStatement& Bind(const char* name, int64_t value);
   SqliteStatement& Bind(const char* name, const std::string& value);
-  // An empty optional is NULL.
-  SqliteStatement& Bind(const char* name, const std::optional<std::string>& value);
+  SqliteStatement& BindNull(const char* name);
 
   // Goes to the next row: false when there is none.
   absl::StatusOr<bool> Step();
-  // Runs a statement that gives no rows; returns how many rows it changed.
-  absl::StatusOr<int64_t> Run();
+  // How many rows the statement that ran last changed.
+  int64_t Changes() const;
 
+  int Columns() const;
   int64_t Integer(int column) const;
   std::string Text(int column) const;  // NULL reads as ""
 
@@ -48,7 +47,7 @@ class SqliteStatement {
 
 // A SQLite database file with the store's settings: write-ahead log, every commit synced to disk (synchronous = FULL),
 // foreign keys checked, waits up to 10 s for another process's lock. Opening it applies the migrations that it lacks,
-// each in a transaction; the number applied is PRAGMA user_version. Not thread-safe.
+// in one transaction; the number applied is PRAGMA user_version. Not thread-safe.
 class SqliteConnection {
  public:
   static absl::StatusOr<SqliteConnection> Open(const std::string& path);
@@ -58,7 +57,7 @@ class SqliteConnection {
   SqliteConnection& operator=(SqliteConnection&&) = delete;
   ~SqliteConnection();
 
-  // The statement of this name in sql/sqlite/statements.sql.
+  // The statement of this name in sql/common or sql/sqlite.
   absl::StatusOr<SqliteStatement> Prepare(const std::string& name);
   // Runs `body` in one transaction: committed when it returns OK, rolled back otherwise.
   absl::Status Transaction(const std::function<absl::Status()>& body);

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <absl/time/time.h>
+
+namespace meshwright {
+
+using SqlValue = std::variant<std::nullopt_t, int64_t, std::string>;
+using SqlParameters = std::vector<std::pair<std::string, SqlValue>>;  // "name" for ":name" in the statement
+
+inline SqlValue NullIfEmpty(const std::string& text) { return text.empty() ? SqlValue(std::nullopt) : SqlValue(text); }
+
+class SqlRow {
+ public:
+  explicit SqlRow(std::vector<std::string> values) : values_(std::move(values)) {}
+  const std::string& Text(size_t column) const { return values_[column]; }  // NULL reads as ""
+  int64_t Integer(size_t column) const;                                     // NULL reads as 0
+  absl::Time Time(size_t column) const { return absl::FromUnixMicros(Integer(column)); }
+
+ private:
+  std::vector<std::string> values_;
+};
+
+struct SqlResult {
+  std::vector<SqlRow> rows;
+  int64_t changed = 0;  // rows that an INSERT, UPDATE or DELETE changed
+};
+
+// What SqlJobStore needs of a database. Thread-safe.
+class SqlDatabase {
+ public:
+  virtual ~SqlDatabase() = default;
+  // Runs one statement of the sql folder as one durable transaction. Errors are those of JobStore.
+  virtual absl::StatusOr<SqlResult> Run(const std::string& statement, const SqlParameters& parameters) = 0;
+  virtual absl::StatusOr<absl::Time> Now() = 0;
+};
+
+// Cuts files of "-- name: x" sections into name -> SQL.
+std::map<std::string, std::string> ParseSqlStatements(const std::vector<std::pair<std::string, std::string>>& files);
+
+// Compiled in from sql/common (see CMakeLists.txt).
+const std::vector<std::pair<std::string, std::string>>& CommonStatements();
+
+}  // namespace meshwright
