@@ -20,6 +20,7 @@
 #include "common/base/files.h"
 #include "common/base/process_usage.h"
 #include "common/base/status_macros.h"
+#include "common/mesh/joined_mesh.h"
 #include "common/mesh/surface_union.h"
 #include "common/scene/view.h"
 #include "common/surface/codec.h"
@@ -186,33 +187,41 @@ class LocalReconstruction {
 
   absl::StatusOr<Json> WriteResults() {
     const std::vector<AcceptedSurface> surfaces = conductor_->AcceptedSurfaces();
-    Tell(LocalStage::kUnion, 0, static_cast<int>(surfaces.size()));
+    Tell(LocalStage::kJoining, 0, static_cast<int>(surfaces.size()));
     MW_ASSIGN_OR_RETURN(Json cameras,
                         MakeCamerasReport(scene_, work_->store(), WorkFolder::kReconstructionId, &totals_));
     if (surfaces.empty()) return absl::FailedPreconditionError(DescribeNothing(totals_, options_));
     if (!settings_.parts_folder.empty()) {
       MW_RETURN_IF_ERROR(WriteParts(scene_, surfaces, work_->blobs(), settings_.parts_folder));
     }
-    int written = 0;
-    MW_ASSIGN_OR_RETURN(const SurfaceUnionCounts counts,
-                        WriteSurfaceUnion(
-                            static_cast<int64_t>(surfaces.size()),
-                            [&](int64_t i) {
-                              Tell(LocalStage::kUnion, written++, static_cast<int>(surfaces.size()));
-                              return LoadAccepted(work_->blobs(), surfaces[static_cast<size_t>(i)]);
-                            },
-                            settings_.output_path));
+    const auto count = static_cast<int>(surfaces.size());
+    int loaded = 0;  // each at least twice
+    const auto load = [&](int64_t i) {
+      Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count);
+      return LoadAccepted(work_->blobs(), surfaces[static_cast<size_t>(i)]);
+    };
+    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts,
+                        WriteJoinedMesh(count, load, options_.join, settings_.output_path, pool_));
     Json report = MakeReport(counts, std::move(cameras));
     MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, report.dump(2) + "\n"));
-    Tell(LocalStage::kUnion, static_cast<int>(surfaces.size()), static_cast<int>(surfaces.size()));
+    Tell(LocalStage::kJoining, count, count);
     return report;
   }
 
-  Json MakeReport(const SurfaceUnionCounts& counts, Json cameras) const {
+  Json MakeReport(const JoinedMeshCounts& counts, Json cameras) const {
     const ProcessUsage usage = MeasureProcessUsage();
     Json report;
     report["program"] = absl::StrCat("meshwright ", MW_VERSION);
-    report["mesh"] = {{"path", settings_.output_path}, {"vertices", counts.vertices}, {"faces", counts.faces}};
+    report["mesh"] = {{"path", settings_.output_path},
+                      {"vertices", counts.vertices},
+                      {"faces", counts.faces},
+                      {"patches_trimmed", counts.patches_trimmed},
+                      {"border_edges_before", counts.border_edges_before},
+                      {"border_edges_after", counts.border_edges_after},
+                      {"stitch_faces", counts.stitch_faces},
+                      {"holes_filled", counts.holes_filled},
+                      {"hole_faces", counts.hole_faces},
+                      {"components_removed", counts.components_removed}};
     report["scene"] = {{"format", scene_.format},
                        {"photographs", scene_.views.size()},
                        {"sparse_points", scene_.points.size()},
@@ -255,8 +264,8 @@ std::string NameOf(LocalStage stage) {
       return "finding pairs";
     case LocalStage::kCameras:
       return "cameras";
-    case LocalStage::kUnion:
-      return "writing the mesh";
+    case LocalStage::kJoining:
+      return "joining the mesh";
   }
   return "";
 }

@@ -25,7 +25,7 @@ struct LocalSettings {
   int64_t memory_limit_bytes = 1 << 30;  // how many jobs run at the same time follows from it
 };
 
-enum class LocalStage { kChecking, kPairs, kCameras, kUnion };
+enum class LocalStage { kChecking, kPairs, kCameras, kJoining };
 std::string NameOf(LocalStage stage);
 
 // What a progress display can show.

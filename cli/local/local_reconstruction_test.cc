@@ -116,7 +116,7 @@ TEST_F(LocalReconstructionTest, SameBytesWithAnyNumberOfThreads) {
   EXPECT_EQ(most_running_, 1);
   EXPECT_EQ(jobs_, kCameras);
   EXPECT_EQ((*one)["totals"]["cameras_processed"], kCameras);
-  EXPECT_EQ(last_progress_.stage, LocalStage::kUnion);
+  EXPECT_EQ(last_progress_.stage, LocalStage::kJoining);
   for (const int threads : {2, 8}) {
     const auto more = Run(Settings("more", threads));
     ASSERT_TRUE(more.ok()) << more.status();

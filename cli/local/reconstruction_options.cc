@@ -15,6 +15,7 @@ absl::Status ReconstructionOptions::Validate() const {
         absl::StrCat("max-targets is ", conductor.targets.max_targets, ", expected 1..", kMaxTargets));
   }
   MW_RETURN_IF_ERROR(job.Validate());
+  MW_RETURN_IF_ERROR(join.Validate());
   return conductor.Validate();
 }
 

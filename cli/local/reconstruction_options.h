@@ -6,6 +6,7 @@
 #include <absl/status/status.h>
 #include <nlohmann/json.hpp>
 
+#include "common/mesh/joined_mesh.h"
 #include "coordinator/conductor/conductor.h"
 #include "worker/camera_job/camera_job.h"
 
@@ -16,6 +17,7 @@ struct ReconstructionOptions {
   int max_image_size = 0;  // px, longest side of the images used; 0: as they are
   CameraJobOptions job;
   ConductorOptions conductor;
+  JoinOptions join;
 
   absl::Status Validate() const;
 };
@@ -78,6 +80,11 @@ void VisitOptions(Options& options, Visitor&& visit) {
 
   group = "Acceptance (3.7)";
   visit(group, "support-radius", acceptance.support_radius_steps, "supporting patches lie this near, d_r");
+
+  group = "Joining";
+  visit(group, "min-component", options.join.min_component_faces, "pieces with fewer faces are left out");
+  visit(group, "max-hole", options.join.max_hole_steps, "flat holes up to this wide are closed, lattice steps");
+  visit(group, "blend", options.join.blend_steps, "colours run into each other this far from seams, lattice steps");
 }
 
 // {"max-image-size": 0, ...} and the program's version: what a work folder must agree with.
