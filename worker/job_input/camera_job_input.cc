@@ -79,13 +79,13 @@ absl::Status CameraJobInputMaker::AddAcceptedSurfaces(const CameraJobSpec& spec,
   return absl::OkStatus();
 }
 
-int64_t CameraJobInputMaker::EstimateBytes(const CameraJobSpec& spec) const {
-  const Camera& reference = cameras_[static_cast<size_t>(spec.camera)];
+int64_t EstimateInputBytes(const CameraJobSpec& spec, const std::vector<Camera>& cameras, int lattice_step) {
+  const Camera& reference = cameras[static_cast<size_t>(spec.camera)];
   int64_t bytes = SamplingImageBytes(reference.width, reference.height);
   bytes += int64_t{3} * reference.width * reference.height;
-  bytes += Lattice::For(reference, lattice_step_).nodes() * static_cast<int64_t>(2 * sizeof(float));
+  bytes += Lattice::For(reference, lattice_step).nodes() * static_cast<int64_t>(2 * sizeof(float));
   for (const CameraIndex target : spec.targets) {
-    const Camera& camera = cameras_[static_cast<size_t>(target)];
+    const Camera& camera = cameras[static_cast<size_t>(target)];
     bytes += SamplingImageBytes(camera.width, camera.height);
   }
   return bytes;

@@ -32,8 +32,7 @@ class CameraJobInputMaker {
 
   const Camera& camera(CameraIndex index) const { return cameras_[static_cast<size_t>(index)]; }
 
-  // Bytes that a job's input takes, photographs shared with other jobs included.
-  int64_t EstimateBytes(const CameraJobSpec& spec) const;
+  int64_t EstimateBytes(const CameraJobSpec& spec) const { return EstimateInputBytes(spec, cameras_, lattice_step_); }
 
  private:
   absl::Status LoadViews(const CameraJobSpec& spec, CameraJobInput& input, ThreadPool& pool) const;
@@ -46,5 +45,8 @@ class CameraJobInputMaker {
   const int lattice_step_;
   std::vector<std::vector<int32_t>> points_of_camera_;  // positions in scene.points
 };
+
+// Bytes that a job's input takes, photographs shared with other jobs included.
+int64_t EstimateInputBytes(const CameraJobSpec& spec, const std::vector<Camera>& cameras, int lattice_step);
 
 }  // namespace meshwright

@@ -1,0 +1,249 @@
+#include "coordinator/grpc/grpc_server.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+#include <absl/time/clock.h>
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+
+#include "meshwright/v1/reconstruction.grpc.pb.h"
+#include "meshwright/v1/worker.grpc.pb.h"
+
+#include "common/base/status_macros.h"
+
+namespace meshwright {
+namespace {
+
+constexpr size_t kChunkBytes = size_t{256} << 10;
+// Blobs go through memory as a whole: nobody may fill it.
+constexpr size_t kMaxBlobBytes = size_t{2} << 30;
+
+grpc::Status ToGrpc(const absl::Status& status) {
+  return {static_cast<grpc::StatusCode>(status.code()), std::string(status.message())};
+}
+
+template <typename Value, typename Fill>
+grpc::Status Answer(const absl::StatusOr<Value>& value, const Fill& fill) {
+  if (value.ok()) fill(*value);
+  return ToGrpc(value.status());
+}
+
+template <typename Response>
+absl::Status SendBytes(const std::string& bytes, grpc::ServerWriter<Response>& writer) {
+  for (size_t begin = 0; begin < bytes.size(); begin += kChunkBytes) {
+    Response response;
+    response.set_chunk(bytes.substr(begin, kChunkBytes));
+    if (!writer.Write(response)) return absl::CancelledError("the client does not read any more");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SendFile(const std::string& path, int64_t offset, grpc::ServerWriter<v1::DownloadMeshResponse>& writer) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+  if (file == nullptr) return absl::DataLossError("the mesh's file cannot be read");
+  if (offset < 0 || ::fseeko(file.get(), offset, SEEK_SET) != 0) {
+    return absl::InvalidArgumentError(absl::StrCat("offset_bytes is ", offset, ", expected >= 0"));
+  }
+  std::vector<char> buffer(kChunkBytes);
+  while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), file.get())) {
+    v1::DownloadMeshResponse response;
+    response.set_chunk(buffer.data(), count);
+    if (!writer.Write(response)) return absl::CancelledError("the client does not read any more");
+  }
+  return std::ferror(file.get()) != 0 ? absl::DataLossError("the mesh's file cannot be read") : absl::OkStatus();
+}
+
+class ReconstructionShell final : public v1::ReconstructionService::Service {
+ public:
+  ReconstructionShell(ReconstructionLogic& logic, WorkerLogic& workers) : logic_(logic), workers_(workers) {}
+
+  grpc::Status CreateReconstruction(grpc::ServerContext*, const v1::CreateReconstructionRequest* request,
+                                    v1::CreateReconstructionResponse* response) override {
+    return Answer(logic_.Create(*request), [&](const auto& value) { *response->mutable_reconstruction() = value; });
+  }
+  grpc::Status UploadSceneFile(grpc::ServerContext*, grpc::ServerReader<v1::UploadSceneFileRequest>* reader,
+                               v1::UploadSceneFileResponse*) override {
+    return ToGrpc(Upload(*reader));
+  }
+  grpc::Status StartReconstruction(grpc::ServerContext*, const v1::StartReconstructionRequest* request,
+                                   v1::StartReconstructionResponse* response) override {
+    return Answer(logic_.Start(request->id()), [&](const auto& value) { *response->mutable_reconstruction() = value; });
+  }
+  grpc::Status GetReconstruction(grpc::ServerContext*, const v1::GetReconstructionRequest* request,
+                                 v1::GetReconstructionResponse* response) override {
+    return Answer(logic_.Get(request->id()), [&](const auto& value) { *response->mutable_reconstruction() = value; });
+  }
+  grpc::Status ListReconstructions(grpc::ServerContext*, const v1::ListReconstructionsRequest* request,
+                                   v1::ListReconstructionsResponse* response) override {
+    return Answer(logic_.List(*request), [&](const auto& value) { *response = value; });
+  }
+  grpc::Status WatchReconstruction(grpc::ServerContext* context, const v1::WatchReconstructionRequest* request,
+                                   grpc::ServerWriter<v1::WatchReconstructionResponse>* writer) override {
+    return ToGrpc(logic_.Watch(request->id(), [&](const v1::Reconstruction& reconstruction) {
+      v1::WatchReconstructionResponse response;
+      *response.mutable_reconstruction() = reconstruction;
+      return !context->IsCancelled() && writer->Write(response);
+    }));
+  }
+  grpc::Status CancelReconstruction(grpc::ServerContext*, const v1::CancelReconstructionRequest* request,
+                                    v1::CancelReconstructionResponse* response) override {
+    return Answer(logic_.Cancel(request->id()),
+                  [&](const auto& value) { *response->mutable_reconstruction() = value; });
+  }
+  grpc::Status DeleteReconstruction(grpc::ServerContext*, const v1::DeleteReconstructionRequest* request,
+                                    v1::DeleteReconstructionResponse*) override {
+    return ToGrpc(logic_.Delete(request->id()));
+  }
+  grpc::Status ListCameras(grpc::ServerContext*, const v1::ListCamerasRequest* request,
+                           v1::ListCamerasResponse* response) override {
+    return Answer(logic_.ListCameras(request->id()), [&](const auto& value) { *response = value; });
+  }
+  grpc::Status GetIncidence(grpc::ServerContext*, const v1::GetIncidenceRequest* request,
+                            v1::GetIncidenceResponse* response) override {
+    return Answer(logic_.GetIncidence(request->id()), [&](const auto& value) { *response = value; });
+  }
+  grpc::Status ListParts(grpc::ServerContext*, const v1::ListPartsRequest* request,
+                         v1::ListPartsResponse* response) override {
+    return Answer(logic_.ListParts(request->id()), [&](const auto& value) { *response = value; });
+  }
+  grpc::Status DownloadMesh(grpc::ServerContext*, const v1::DownloadMeshRequest* request,
+                            grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {
+    const absl::StatusOr<std::string> path = logic_.MeshPath(request->id());
+    return ToGrpc(path.ok() ? SendFile(*path, request->offset_bytes(), *writer) : path.status());
+  }
+  grpc::Status DownloadPart(grpc::ServerContext*, const v1::DownloadPartRequest* request,
+                            grpc::ServerWriter<v1::DownloadPartResponse>* writer) override {
+    const absl::StatusOr<std::string> bytes = logic_.PartBytes(request->id(), request->sequence());
+    return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
+  }
+  grpc::Status ListWorkers(grpc::ServerContext*, const v1::ListWorkersRequest*,
+                           v1::ListWorkersResponse* response) override {
+    *response = workers_.ListWorkers();
+    return grpc::Status::OK;
+  }
+
+ private:
+  absl::Status Upload(grpc::ServerReader<v1::UploadSceneFileRequest>& reader) {
+    v1::UploadSceneFileRequest request;
+    if (!reader.Read(&request) || !request.has_header()) {
+      return absl::InvalidArgumentError("header: expected in the first message");
+    }
+    MW_ASSIGN_OR_RETURN(SceneFileUpload upload, logic_.BeginUpload(request.header()));
+    while (reader.Read(&request)) {
+      if (!request.has_chunk()) return absl::InvalidArgumentError("chunk: expected in all messages but the first");
+      MW_RETURN_IF_ERROR(upload.Append(request.chunk()));
+    }
+    return upload.Finish();
+  }
+
+  ReconstructionLogic& logic_;
+  WorkerLogic& workers_;
+};
+
+class WorkerShell final : public v1::WorkerService::Service {
+ public:
+  WorkerShell(WorkerLogic& logic, BlobStore& blobs) : logic_(logic), blobs_(blobs) {}
+
+  grpc::Status Synchronize(grpc::ServerContext* context, const v1::SynchronizeRequest* request,
+                           v1::SynchronizeResponse* response) override {
+    return Answer(logic_.Synchronize(*request, [&] { return context->IsCancelled(); }),
+                  [&](const auto& value) { *response = value; });
+  }
+  grpc::Status FetchBlob(grpc::ServerContext*, const v1::FetchBlobRequest* request,
+                         grpc::ServerWriter<v1::FetchBlobResponse>* writer) override {
+    const absl::StatusOr<std::string> bytes = blobs_.Get(request->digest());
+    return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
+  }
+  grpc::Status PutBlob(grpc::ServerContext*, grpc::ServerReader<v1::PutBlobRequest>* reader,
+                       v1::PutBlobResponse* response) override {
+    return Answer(Put(*reader), [&](const std::string& digest) { response->set_digest(digest); });
+  }
+
+ private:
+  absl::StatusOr<std::string> Put(grpc::ServerReader<v1::PutBlobRequest>& reader) {
+    v1::PutBlobRequest request;
+    if (!reader.Read(&request) || request.content_case() != v1::PutBlobRequest::kDigest) {
+      return absl::InvalidArgumentError("digest: expected in the first message");
+    }
+    const std::string expected = request.digest();
+    MW_RETURN_IF_ERROR(ValidateDigest(expected));
+    std::string bytes;
+    while (reader.Read(&request)) {
+      bytes += request.chunk();
+      if (bytes.size() > kMaxBlobBytes) {
+        return absl::InvalidArgumentError(absl::StrCat("chunk: more than ", kMaxBlobBytes, " bytes"));
+      }
+    }
+    if (const std::string digest = Sha256Hex(bytes); digest != expected) {
+      return absl::InvalidArgumentError(absl::StrCat("digest is ", expected, ", the bytes have ", digest));
+    }
+    return blobs_.Put(bytes);
+  }
+
+  WorkerLogic& logic_;
+  BlobStore& blobs_;
+};
+
+class RealGrpcServer final : public GrpcServer {
+ public:
+  RealGrpcServer(ReconstructionLogic& reconstructions, WorkerLogic& workers, BlobStore& blobs)
+      : reconstructions_(reconstructions),
+        workers_(workers),
+        reconstruction_shell_(reconstructions, workers),
+        worker_shell_(workers, blobs) {}
+  ~RealGrpcServer() override { Shutdown(absl::Seconds(1)); }
+
+  absl::Status Listen(const std::string& address) {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    grpc::ServerBuilder builder;
+    builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port_);
+    // Two coordinators on one port would each get half of the calls.
+    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5000);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+    builder.RegisterService(&reconstruction_shell_);
+    builder.RegisterService(&worker_shell_);
+    server_ = builder.BuildAndStart();
+    if (server_ == nullptr || port_ == 0) {
+      return absl::UnavailableError(absl::StrCat("cannot listen on ", address));
+    }
+    return absl::OkStatus();
+  }
+
+  int port() const override { return port_; }
+
+  void Shutdown(absl::Duration deadline) override {
+    if (server_ == nullptr) return;
+    workers_.Shutdown();
+    reconstructions_.Shutdown();
+    server_->Shutdown(absl::ToChronoTime(absl::Now() + deadline));
+    server_->Wait();
+    server_.reset();
+  }
+
+ private:
+  ReconstructionLogic& reconstructions_;
+  WorkerLogic& workers_;
+  ReconstructionShell reconstruction_shell_;
+  WorkerShell worker_shell_;
+  int port_ = 0;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const std::string& address,
+                                                              ReconstructionLogic& reconstructions,
+                                                              WorkerLogic& workers, BlobStore& blobs) {
+  auto server = std::make_unique<RealGrpcServer>(reconstructions, workers, blobs);
+  MW_RETURN_IF_ERROR(server->Listen(address));
+  return server;
+}
+
+}  // namespace meshwright

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <absl/status/statusor.h>
+#include <absl/time/time.h>
+
+#include "common/blob/blob_store.h"
+#include "coordinator/api/reconstruction_logic.h"
+#include "coordinator/api/worker_logic.h"
+
+namespace meshwright {
+
+// ReconstructionService, WorkerService, health and reflection on one port: a thin shell over the logic.
+class GrpcServer {
+ public:
+  // `address`: "host:port"; port 0 takes a free one. All of it outlives the server.
+  static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(const std::string& address,
+                                                           ReconstructionLogic& reconstructions, WorkerLogic& workers,
+                                                           BlobStore& blobs);
+  virtual ~GrpcServer() = default;
+  virtual int port() const = 0;
+  // Answers what waits, then ends calls that last longer than `deadline`.
+  virtual void Shutdown(absl::Duration deadline) = 0;
+};
+
+}  // namespace meshwright

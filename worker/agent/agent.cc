@@ -1,0 +1,221 @@
+#include "worker/agent/agent.h"
+
+#include <algorithm>
+#include <chrono>
+#include <new>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/time/clock.h>
+
+#include "common/base/status_macros.h"
+#include "worker/job_input/run_job.h"
+
+namespace meshwright {
+namespace {
+
+constexpr double kPatienceSeconds = 10;
+constexpr double kDrainingPatienceSeconds = 0.5;
+constexpr std::chrono::milliseconds kFirstRetry(200);
+constexpr std::chrono::milliseconds kLastRetry(5000);
+constexpr int64_t kCacheShare = 8;
+
+std::string DrawInstance() {
+  std::random_device random;
+  return absl::StrFormat("%08x%08x", random(), random());
+}
+
+std::string NameOf(const v1::JobKey& key) {
+  return absl::StrFormat("reconstruction=%s job=%d epoch=%d", key.reconstruction_id(), key.sequence(), key.epoch());
+}
+
+// Errors that another attempt would meet again; all others are the network's or the store's.
+bool IsJobsFault(const absl::Status& status) {
+  return absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status);
+}
+
+absl::StatusOr<CameraJobSpec> ToSpec(const v1::CameraJob& job, size_t cameras) {
+  const auto known = [&](int32_t camera) { return camera >= 0 && static_cast<size_t>(camera) < cameras; };
+  CameraJobSpec spec = {.sequence = job.key().sequence(),
+                        .camera = job.camera(),
+                        .snapshot = job.snapshot(),
+                        .epoch = job.key().epoch(),
+                        .neighbours = {job.neighbours().begin(), job.neighbours().end()},
+                        .targets = {job.targets().begin(), job.targets().end()}};
+  for (const v1::AcceptedSurface& surface : job.accepted()) {
+    spec.accepted.push_back({.sequence = surface.sequence(),
+                             .camera = surface.camera(),
+                             .digest = surface.digest(),
+                             .patches = surface.patches()});
+  }
+  if (!known(spec.camera) || !std::all_of(spec.targets.begin(), spec.targets.end(), known) ||
+      spec.targets.size() > static_cast<size_t>(kMaxTargets)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("job ", spec.sequence, ": its cameras are not the scene's ", cameras));
+  }
+  return spec;
+}
+
+}  // namespace
+
+Agent::Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, ParseJobMethod parse, AgentJob job,
+             AgentLog log)
+    : options_(options),
+      instance_(DrawInstance()),
+      channel_(channel),
+      blobs_(blobs),
+      job_(std::move(job)),
+      log_(std::move(log)),
+      contexts_(blobs, std::move(parse), options.memory_bytes / kCacheShare),
+      pool_(options.cores) {}
+
+Agent::~Agent() {
+  for (auto& [key, held] : held_) held.thread.join();
+}
+
+void Agent::Drain() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (draining_) return;
+    draining_ = true;
+    drain_until_ = absl::Now() + options_.drain;
+  }
+  wake_.notify_all();
+  channel_.Interrupt();
+}
+
+v1::SynchronizeRequest Agent::NextRequest() {
+  const absl::Time now = absl::Now();
+  v1::SynchronizeRequest request;
+  request.set_worker_id(options_.worker_id);
+  request.set_instance(instance_);
+  request.set_version(options_.version);
+  request.set_memory_bytes(options_.memory_bytes);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  int lost_cores = 0;
+  for (auto& [key, held] : held_) {
+    if (held.dropped) {
+      ++lost_cores;
+      continue;
+    }
+    if (held.running && now >= drain_until_) {
+      held.told.mutable_given_back();
+    } else if (held.running) {
+      held.told.mutable_running()->set_seconds(absl::ToDoubleSeconds(now - held.begun));
+    }
+    *request.add_held() = held.told;
+  }
+  request.set_cores(std::max(1, options_.cores - lost_cores));
+  request.set_draining(draining_ || lost_cores >= options_.cores);
+  request.set_patience_seconds(draining_ ? kDrainingPatienceSeconds : kPatienceSeconds);
+  return request;
+}
+
+void Agent::Follow(const v1::SynchronizeResponse& response) {
+  std::map<Key, const v1::CameraJob*> wanted;
+  for (const v1::CameraJob& job : response.jobs()) {
+    wanted[{job.key().reconstruction_id(), job.key().sequence(), job.key().epoch()}] = &job;
+  }
+  std::vector<std::thread> ended;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (auto it = held_.begin(); it != held_.end();) {
+      Held& held = it->second;
+      const bool drop = held.dropped || wanted.count(it->first) == 0;
+      if (drop && held.running && !held.dropped) {
+        held.dropped = true;
+        log_(absl::StrCat("dropped ", NameOf(held.told.key())));
+      }
+      if (drop && !held.running) {
+        ended.push_back(std::move(held.thread));
+        it = held_.erase(it);
+      } else {
+        ++it;
+      }
+    }
+    for (const auto& [key, job] : wanted) {
+      if (held_.count(key) > 0 || draining_) continue;
+      Held& held = held_[key];
+      *held.told.mutable_key() = job->key();
+      held.told.mutable_running();
+      held.begun = absl::Now();
+      held.thread = std::thread([this, key = key, job = *job] { Work(key, job); });
+    }
+  }
+  for (std::thread& thread : ended) thread.join();
+}
+
+void Agent::Work(const Key& key, const v1::CameraJob& job) {
+  log_(absl::StrCat("begun ", NameOf(job.key()), " camera=", job.camera()));
+  const absl::Time begun = absl::Now();
+  v1::HeldJob told = Process(job);
+  const double seconds = absl::ToDoubleSeconds(absl::Now() - begun);
+  log_(told.has_failed() ? absl::StrCat("failed ", NameOf(job.key()), " reason=\"", told.failed().reason(), "\"")
+                         : absl::StrFormat("finished %s seconds=%.2f", NameOf(job.key()), seconds));
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    Held& held = held_.at(key);
+    held.told = std::move(told);
+    held.running = false;
+  }
+  wake_.notify_all();
+  channel_.Interrupt();
+}
+
+v1::HeldJob Agent::Process(const v1::CameraJob& job) {
+  v1::HeldJob told;
+  *told.mutable_key() = job.key();
+  const auto process = [&]() -> absl::StatusOr<FinishedJob> {
+    MW_ASSIGN_OR_RETURN(const std::shared_ptr<const JobContext> context,
+                        contexts_.For(job.scene_digest(), job.options_json()));
+    MW_ASSIGN_OR_RETURN(const CameraJobSpec spec, ToSpec(job, context->cameras.size()));
+    const CameraJobFunction function = [&](const CameraJobInput& input, ThreadPool& pool) {
+      return job_(input, context->method.job, pool);
+    };
+    return RunJob(context->scene, spec, *context->inputs, function, blobs_, pool_);
+  };
+  try {
+    const absl::StatusOr<FinishedJob> finished = process();
+    if (finished.ok()) {
+      v1::HeldJob::Finished& result = *told.mutable_finished();
+      result.set_filtered_digest(finished->filtered_digest);
+      result.mutable_weak_targets()->Add(finished->weak_targets.begin(), finished->weak_targets.end());
+      result.set_report_json(finished->report_json);
+    } else {
+      told.mutable_failed()->set_reason(std::string(finished.status().message()));
+      told.mutable_failed()->set_infrastructure(!IsJobsFault(finished.status()));
+    }
+  } catch (const std::bad_alloc&) {
+    told.mutable_failed()->set_reason("out of memory");
+  }
+  return told;
+}
+
+bool Agent::Finished() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return draining_ && std::all_of(held_.begin(), held_.end(), [](const auto& entry) { return entry.second.dropped; });
+}
+
+void Agent::Run() {
+  std::chrono::milliseconds retry = kFirstRetry;
+  while (true) {
+    const bool last = Finished();
+    const absl::StatusOr<v1::SynchronizeResponse> response = channel_.Synchronize(NextRequest());
+    if (response.ok()) {
+      Follow(*response);
+      retry = kFirstRetry;
+    }
+    if (last) return;
+    if (response.ok() || absl::IsCancelled(response.status())) continue;
+    log_(absl::StrCat("no answer from the coordinator: ", std::string(response.status().message())));
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (absl::Now() >= drain_until_) return;
+    wake_.wait_for(lock, retry);
+    retry = std::min(2 * retry, kLastRetry);
+  }
+}
+
+}  // namespace meshwright

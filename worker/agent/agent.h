@@ -1,0 +1,85 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <tuple>
+
+#include <absl/time/time.h>
+
+#include "meshwright/v1/worker.pb.h"
+
+#include "common/base/thread_pool.h"
+#include "common/blob/blob_store.h"
+#include "worker/agent/job_contexts.h"
+#include "worker/agent/worker_channel.h"
+
+namespace meshwright {
+
+struct AgentOptions {
+  std::string worker_id;
+  std::string version;
+  int cores = 1;                             // jobs at the same time, and cores of all of them together
+  int64_t memory_bytes = 1 << 30;            // what jobs may take together
+  absl::Duration drain = absl::Seconds(30);  // after Drain(), jobs may take so long before they are given back
+};
+
+// What a worker says while it works, one line each: job begun, finished, failed, dropped.
+using AgentLog = std::function<void(const std::string& line)>;
+
+// What RunCameraJob is, or something quick in tests.
+using AgentJob = std::function<CameraJobResult(const CameraJobInput&, const CameraJobOptions&, ThreadPool&)>;
+
+// A worker: holds what the coordinator says that it should hold, and tells what has become of it. All state is in
+// memory; losing it costs the jobs that run, nothing else.
+class Agent {
+ public:
+  // `channel` and `blobs` outlive the agent.
+  Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, ParseJobMethod parse, AgentJob job,
+        AgentLog log);
+  // Waits for jobs that still run.
+  ~Agent();
+
+  // Works until Drain() and what follows from it.
+  void Run();
+  // From another thread: takes no new jobs; Run() returns once all that run are finished or given back.
+  void Drain();
+
+ private:
+  using Key = std::tuple<std::string, int32_t, int64_t>;  // reconstruction, sequence, epoch
+  struct Held {
+    v1::HeldJob told;  // what the coordinator is told
+    absl::Time begun;
+    bool running = true;
+    bool dropped = false;  // nobody wants the result
+    std::thread thread;
+  };
+
+  void Work(const Key& key, const v1::CameraJob& job);
+  v1::HeldJob Process(const v1::CameraJob& job);
+  v1::SynchronizeRequest NextRequest();
+  void Follow(const v1::SynchronizeResponse& response);
+  bool Finished();
+
+  const AgentOptions options_;
+  const std::string instance_;
+  WorkerChannel& channel_;
+  BlobStore& blobs_;
+  const AgentJob job_;
+  const AgentLog log_;
+  JobContexts contexts_;
+  ThreadPool pool_;
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::map<Key, Held> held_;
+  bool draining_ = false;
+  absl::Time drain_until_ = absl::InfiniteFuture();
+};
+
+}  // namespace meshwright

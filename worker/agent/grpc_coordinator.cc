@@ -1,0 +1,123 @@
+#include "worker/agent/grpc_coordinator.h"
+
+#include <chrono>
+#include <mutex>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+#include <grpcpp/grpcpp.h>
+
+#include "meshwright/v1/worker.grpc.pb.h"
+
+#include "common/base/digest.h"
+#include "common/base/status_macros.h"
+
+namespace meshwright {
+namespace {
+
+constexpr size_t kChunkBytes = size_t{256} << 10;
+constexpr int kMaxMessageBytes = 64 << 20;
+// Beyond the patience that a request asks for.
+constexpr double kAnswerSeconds = 10;
+constexpr std::chrono::minutes kBlobDeadline(10);
+
+absl::Status FromGrpc(const grpc::Status& status) {
+  if (status.ok()) return absl::OkStatus();
+  return {static_cast<absl::StatusCode>(status.error_code()), status.error_message()};
+}
+
+class RealGrpcCoordinator final : public GrpcCoordinator {
+ public:
+  explicit RealGrpcCoordinator(const std::shared_ptr<grpc::Channel>& channel)
+      : stub_(v1::WorkerService::NewStub(channel)) {}
+
+  absl::StatusOr<v1::SynchronizeResponse> Synchronize(const v1::SynchronizeRequest& request) override {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(static_cast<int64_t>(
+                                                                1000 * (request.patience_seconds() + kAnswerSeconds))));
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (std::exchange(interrupted_, false)) return absl::CancelledError("interrupted");
+      waiting_ = &context;
+    }
+    v1::SynchronizeResponse response;
+    const grpc::Status status = stub_->Synchronize(&context, request, &response);
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      waiting_ = nullptr;
+    }
+    if (!status.ok()) return FromGrpc(status);
+    return response;
+  }
+
+  void Interrupt() override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (waiting_ != nullptr) {
+      waiting_->TryCancel();
+    } else {
+      interrupted_ = true;
+    }
+  }
+
+  absl::StatusOr<std::string> Put(const std::string& bytes) override {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kBlobDeadline);
+    v1::PutBlobResponse response;
+    const auto writer = stub_->PutBlob(&context, &response);
+    v1::PutBlobRequest request;
+    request.set_digest(Sha256Hex(bytes));
+    bool open = writer->Write(request);
+    for (size_t begin = 0; open && begin < bytes.size(); begin += kChunkBytes) {
+      request.set_chunk(bytes.substr(begin, kChunkBytes));
+      open = writer->Write(request);
+    }
+    if (open) writer->WritesDone();
+    MW_RETURN_IF_ERROR(FromGrpc(writer->Finish()));
+    return response.digest();
+  }
+
+  absl::StatusOr<std::string> Get(const std::string& digest) override {
+    MW_RETURN_IF_ERROR(ValidateDigest(digest));
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kBlobDeadline);
+    v1::FetchBlobRequest request;
+    request.set_digest(digest);
+    const auto reader = stub_->FetchBlob(&context, request);
+    v1::FetchBlobResponse response;
+    std::string bytes;
+    while (reader->Read(&response)) bytes += response.chunk();
+    MW_RETURN_IF_ERROR(FromGrpc(reader->Finish()));
+    if (Sha256Hex(bytes) != digest) {
+      return absl::DataLossError(absl::StrCat("blob ", digest, ": other bytes arrived from the coordinator"));
+    }
+    return bytes;
+  }
+
+  absl::StatusOr<bool> Has(const std::string&) override {
+    return absl::UnimplementedError("workers do not ask the coordinator which blobs there are");
+  }
+  absl::Status Delete(const std::string&) override {
+    return absl::UnimplementedError("workers delete no blobs of the coordinator");
+  }
+
+ private:
+  const std::unique_ptr<v1::WorkerService::Stub> stub_;
+  std::mutex mutex_;
+  grpc::ClientContext* waiting_ = nullptr;
+  bool interrupted_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& address) {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10'000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
+  // A coordinator that was started anew is found within seconds.
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2'000);
+  return std::make_unique<RealGrpcCoordinator>(
+      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+}
+
+}  // namespace meshwright

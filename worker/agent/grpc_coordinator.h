@@ -1,0 +1,19 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "common/blob/blob_store.h"
+#include "worker/agent/worker_channel.h"
+
+namespace meshwright {
+
+// A coordinator at "host:port", as a WorkerChannel, and as a BlobStore for workers that reach no other: Put and Get
+// stream through it; Has and Delete are Unimplemented, workers need neither. Thread-safe. Connects when it is used
+// first, and again whenever the connection breaks.
+class GrpcCoordinator : public WorkerChannel, public BlobStore {
+ public:
+  static std::unique_ptr<GrpcCoordinator> Connect(const std::string& address);
+};
+
+}  // namespace meshwright
