@@ -15,6 +15,9 @@
 
 namespace meshwright {
 
+// Bytes that a job's input takes, photographs shared with other jobs included.
+int64_t EstimateInputBytes(const CameraJobSpec& spec, const std::vector<Camera>& cameras, int lattice_step);
+
 // Turns a job's specification into the values that the job works on: photographs, V_r, sparse points.
 class CameraJobInputMaker {
  public:
@@ -45,8 +48,5 @@ class CameraJobInputMaker {
   const int lattice_step_;
   std::vector<std::vector<int32_t>> points_of_camera_;  // positions in scene.points
 };
-
-// Bytes that a job's input takes, photographs shared with other jobs included.
-int64_t EstimateInputBytes(const CameraJobSpec& spec, const std::vector<Camera>& cameras, int lattice_step);
 
 }  // namespace meshwright
