@@ -1,5 +1,6 @@
 # Reads ctest's JUnit file; for each test that is a GoogleTest program the cases in results/NAME.xml count, otherwise the
-# test itself. A program that failed without a failed case (crash, time limit) counts as one failure more.
+# test itself. A program that failed without a failed case (crash, time limit) counts as one failure more, and so does a
+# test that could not be run for any other reason than its own wish to be skipped.
 
 function attribute(line, name,    at, text) {
   at = index(line, " " name "=\"")
@@ -21,16 +22,24 @@ function attribute(line, name,    at, text) {
   }
   close(file)
   if (cases == 0) {
-    cases = 1
-    if (status == "fail") bad = 1
-    else if (status != "run") ignored = 1
-  } else if (status == "fail" && bad == 0) {
+    # A test that was not run says why on the next line.
+    if (status == "run") ++passed
+    else if (status == "fail") ++failed
+    next
+  }
+  if (status != "run" && bad == 0) {
     ++cases
     bad = 1
   }
   passed += cases - bad - ignored
   failed += bad
   skipped += ignored
+}
+
+/<skipped message=/ {
+  if (cases > 0) next
+  if (attribute($0, "message") ~ /^(SKIP_|Disabled)/) ++skipped
+  else ++failed
 }
 
 END {
