@@ -110,7 +110,7 @@ void BorderStitcher::FindNearby(const Eigen::Vector3d& x, double radius, std::ve
   std::frexp(radius, &level);  // radius < 2^level
   const double width = std::ldexp(1.0, level);
   const auto cell_of = [&](const Eigen::Vector3d& at) {
-    std::array<int32_t, 3> cell;
+    std::array<int32_t, 3> cell = {};
     for (int k = 0; k < 3; ++k) {
       // Far beyond any scene the cells melt into one; that costs time only.
       cell[static_cast<size_t>(k)] = static_cast<int32_t>(std::clamp(std::floor(at[k] / width), -1e9, 1e9));
@@ -366,14 +366,29 @@ std::vector<BorderStitcher::Hole> BorderStitcher::FindHoles(double max_width) co
     const bool is_flat = static_cast<double>(std::ranges::count_if(loop.corners, fits)) >= kMinFlatShare * count;
     if (is_slit || is_flat) holes.push_back(std::move(loop));
   }
+  // The first hole around each island; only holes near it along x are looked at.
+  std::vector<std::pair<double, size_t>> by_x;
+  by_x.reserve(holes.size());
+  double largest = 0;
+  for (size_t h = 0; h < holes.size(); ++h) {
+    by_x.emplace_back(holes[h].center.x(), h);
+    largest = std::max(largest, holes[h].radius);
+  }
+  std::ranges::sort(by_x);
   for (const Hole& island : islands) {
-    for (Hole& hole : holes) {
-      const Eigen::Vector3d offset = island.center - hole.center;
-      if (offset.norm() + island.radius < 1.01 * hole.radius && island.normal.dot(hole.normal) > kMinSheetCosine) {
-        hole.corners.insert(hole.corners.end(), island.corners.begin(), island.corners.end());
-        break;
+    size_t around = holes.size();
+    const double x = island.center.x();
+    for (auto at = std::ranges::lower_bound(by_x, std::pair(x - largest, size_t{0}));
+         at != by_x.end() && at->first <= x + largest; ++at) {
+      const Hole& hole = holes[at->second];
+      if ((island.center - hole.center).norm() + island.radius < 1.01 * hole.radius &&
+          island.normal.dot(hole.normal) > kMinSheetCosine) {
+        around = std::min(around, at->second);
       }
     }
+    if (around == holes.size()) continue;
+    std::vector<int32_t>& corners = holes[around].corners;
+    corners.insert(corners.end(), island.corners.begin(), island.corners.end());
   }
   return holes;
 }

@@ -420,6 +420,7 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
   }
   MW_RETURN_IF_ERROR(writer.Append(copy_mesh));
   std::vector<std::array<uint32_t, 3>> joining;
+  joining.reserve(faces.size());
   for (const auto& face : faces) {
     joining.push_back({index_of_border[static_cast<size_t>(face[0])], index_of_border[static_cast<size_t>(face[1])],
                        index_of_border[static_cast<size_t>(face[2])]});

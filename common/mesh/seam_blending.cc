@@ -54,14 +54,15 @@ void BlendSeams(const std::vector<SeamOffset>& offsets, int steps, PatchLattice&
         next_ring.emplace_back(neighbour, Eigen::Vector3f::Zero());
       });
     }
-    for (auto& [node, offset] : next_ring) {
+    for (auto& entry : next_ring) {
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
       float weight = 0;
-      for_each_linked(node, [&](int32_t neighbour) {
+      for_each_linked(entry.first, [&](int32_t neighbour) {
         if (ring_of_node[static_cast<size_t>(neighbour)] != k) return;
-        offset += ring[static_cast<size_t>(entry_of_node[static_cast<size_t>(neighbour)])].second;
+        sum += ring[static_cast<size_t>(entry_of_node[static_cast<size_t>(neighbour)])].second;
         weight += 1;
       });
-      offset /= weight;
+      entry.second = sum / weight;
     }
     const float fade = static_cast<float>(steps + 1 - k) / static_cast<float>(steps);
     for (const auto& [node, offset] : ring) AddTo(surface.rgb[static_cast<size_t>(node)], offset * fade);
