@@ -1,0 +1,89 @@
+// How many camera jobs a second the stores hand out, with as many callers as threads.
+#include <cstdlib>
+#include <filesystem>
+#include <mutex>
+#include <optional>
+
+#include <absl/strings/str_cat.h>
+#include <benchmark/benchmark.h>
+
+#include "common/base/check.h"
+#include "coordinator/store/postgres_job_store.h"
+#include "coordinator/store/postgres_testing.h"
+#include "coordinator/store/sqlite_job_store.h"
+
+namespace meshwright {
+namespace {
+
+constexpr int kJobs = 200;  // waiting at a time: a window of this many
+const absl::Time kNow = absl::FromUnixSeconds(1'000'000'000);
+
+class TestStore {
+ public:
+  explicit TestStore(bool postgres) {
+    if (postgres) {
+      const auto server = SharedTestPostgres();
+      MW_CHECK(server.ok());
+      schema_.emplace(*server);
+      store_ = *OpenPostgresJobStore(schema_->url());
+    } else {
+      folder_ = (std::filesystem::temp_directory_path() / "store_benchmark_XXXXXX").string();
+      MW_CHECK(mkdtemp(folder_.data()) != nullptr);
+      store_ = *OpenSqliteJobStore(folder_ + "/state.sqlite");
+    }
+    MW_CHECK(store_->CreateReconstruction({"castle", "{}", std::string(64, '0')}, kNow).ok());
+    for (int s = 1; s <= kJobs; ++s) MW_CHECK(store_->AssignCameraJob("castle", s, s, 0, kNow).ok());
+  }
+  ~TestStore() {
+    store_.reset();
+    if (!folder_.empty()) std::filesystem::remove_all(folder_);
+  }
+  JobStore& operator*() { return *store_; }
+
+ private:
+  std::optional<PostgresSchema> schema_;
+  std::string folder_;
+  std::unique_ptr<JobStore> store_;
+};
+
+std::unique_ptr<TestStore> shared_store;  // of all threads of a run
+
+// Claim one job, give it back: two durable transactions.
+void ClaimAndRelease(benchmark::State& state) {
+  if (state.thread_index() == 0) shared_store = std::make_unique<TestStore>(state.range(0) == 1);
+  const std::string worker = absl::StrCat("worker", state.thread_index());
+  for (auto _ : state) {
+    const auto leases =
+        (**shared_store).LeaseCameraJobs({.worker = worker, .expires_at = kNow + absl::Seconds(30), .now = kNow});
+    MW_CHECK(leases.ok() && leases->size() == 1);
+    const CameraJob& job = leases->front().job;
+    MW_CHECK((**shared_store).ReleaseLease("castle", job.sequence, job.epoch, worker, kNow).ok());
+  }
+  state.SetItemsProcessed(state.iterations());
+  if (state.thread_index() == 0) shared_store.reset();
+}
+BENCHMARK(ClaimAndRelease)->ArgName("postgres")->Arg(0)->Arg(1)->ThreadRange(1, 8)->UseRealTime();
+
+// What one camera job costs the store from end to end: assigned, claimed, completed, committed.
+void WholeLife(benchmark::State& state) {
+  TestStore store(state.range(0) == 1);
+  MW_CHECK((*store).CreateReconstruction({"abbey", "{}", std::string(64, '0')}, kNow).ok());
+  SequenceNumber s = 0;
+  for (auto _ : state) {
+    ++s;
+    MW_CHECK((*store).AssignCameraJob("abbey", s, s, 0, kNow).ok());
+    const auto leases = (*store).LeaseCameraJobs(
+        {.worker = "w", .reconstruction_ids = {"abbey"}, .expires_at = kNow + absl::Seconds(30), .now = kNow});
+    MW_CHECK(leases.ok() && leases->size() == 1);
+    MW_CHECK(
+        (*store)
+            .CompleteCameraJob("abbey", s, leases->front().job.epoch, std::string(64, 'a'), {}, R"({"seeds":9})", kNow)
+            .ok());
+    MW_CHECK((*store).AddCommit("abbey", {s, s, std::string(64, 'b'), 9, 4}, kNow).ok());
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+BENCHMARK(WholeLife)->ArgName("postgres")->Arg(0)->Arg(1)->UseRealTime();
+
+}  // namespace
+}  // namespace meshwright

@@ -1,0 +1,251 @@
+#include "coordinator/store/postgres_connection.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <utility>
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/time/clock.h>
+#include <libpq-fe.h>
+#include <poll.h>
+
+#include "common/base/check.h"
+
+namespace meshwright {
+
+// Compiled in from sql/postgres (see CMakeLists.txt).
+const std::vector<std::pair<std::string, std::string>>& PostgresMigrations();
+
+namespace {
+
+constexpr int64_t kMigrationLock = 0x4d574a53;  // the key of the advisory lock: "MWJS", as in SQLite files
+
+using ResultOwner = std::unique_ptr<PGresult, void (*)(PGresult*)>;
+
+bool StartsWith(const std::string& text, const char* prefix) { return text.rfind(prefix, 0) == 0; }
+
+// https://www.postgresql.org/docs/15/errcodes-appendix.html
+PostgresError Classify(const std::string& code, const std::string& message) {
+  if (code == "40001" || code == "40P01" || code == "55P03") {
+    return {PostgresFault::kTransient, absl::UnavailableError(message)};
+  }
+  // The session ends (57P..), the server is a standby now (25006), or the session's prepared statements are not what
+  // they were (26000, 0A000).
+  if (StartsWith(code, "08") || StartsWith(code, "57P") || code == "25006" || code == "26000" || code == "0A000") {
+    return {PostgresFault::kBroken, absl::UnavailableError(message)};
+  }
+  const auto final_error = [](absl::Status status) { return PostgresError{PostgresFault::kFinal, std::move(status)}; };
+  if (code == "23505") return final_error(absl::AlreadyExistsError(message));
+  if (StartsWith(code, "23")) return final_error(absl::FailedPreconditionError(message));
+  if (StartsWith(code, "22")) return final_error(absl::InvalidArgumentError(message));
+  if (code == "42501" || StartsWith(code, "28")) return final_error(absl::PermissionDeniedError(message));
+  if (StartsWith(code, "53")) return final_error(absl::ResourceExhaustedError(message));
+  if (StartsWith(code, "XX001") || StartsWith(code, "XX002")) return final_error(absl::DataLossError(message));
+  if (code == "57014") return final_error(absl::UnavailableError(message));
+  return final_error(absl::InternalError(absl::StrCat(message, " (SQLSTATE ", code, ")")));
+}
+
+}  // namespace
+
+PostgresStatement NumberParameters(const std::string& sql) {
+  PostgresStatement statement;
+  for (size_t at = 0; at < sql.size();) {
+    size_t end = at + 1;
+    if (sql[at] == ':') {
+      while (end < sql.size() && (absl::ascii_islower(static_cast<unsigned char>(sql[end])) || sql[end] == '_')) ++end;
+    }
+    if (end == at + 1) {
+      statement.sql += sql[at];
+    } else {
+      const std::string name = sql.substr(at + 1, end - at - 1);
+      auto found = std::find(statement.parameters.begin(), statement.parameters.end(), name);
+      if (found == statement.parameters.end()) found = statement.parameters.insert(found, name);
+      absl::StrAppend(&statement.sql, "$", 1 + (found - statement.parameters.begin()));
+    }
+    at = end;
+  }
+  return statement;
+}
+
+absl::StatusOr<std::string> DescribePostgresUrl(const std::string& url) {
+  char* error = nullptr;
+  PQconninfoOption* const options = PQconninfoParse(url.c_str(), &error);
+  // libpq's own message may repeat the whole string, password included.
+  PQfreemem(error);
+  if (options == nullptr) {
+    return absl::InvalidArgumentError(
+        "not a connection string of PostgreSQL, expected postgresql://USER@HOST:PORT/DATABASE");
+  }
+  std::map<std::string, std::string> values;
+  for (const PQconninfoOption* option = options; option->keyword != nullptr; ++option) {
+    if (option->val != nullptr) values[option->keyword] = option->val;
+  }
+  PQconninfoFree(options);
+  const auto value_or = [&](const char* key, const char* otherwise) {
+    return values[key].empty() ? std::string(otherwise) : values[key];
+  };
+  return absl::StrCat("PostgreSQL at ", value_or("host", "localhost"), ":", value_or("port", "5432"), "/",
+                      value_or("dbname", ""));
+}
+
+PostgresConnection::PostgresConnection(pg_conn* connection, std::string description)
+    : connection_(connection), description_(std::move(description)) {}
+
+PostgresConnection::~PostgresConnection() { PQfinish(connection_); }
+
+PostgresError PostgresConnection::Open(const std::string& url, const std::string& description,
+                                       std::unique_ptr<PostgresConnection>* connection) {
+  // What comes later counts, so the connection string may say otherwise. A peer that vanished is noticed after 10 s.
+  const char* const keywords[] = {"connect_timeout",
+                                  "tcp_user_timeout",
+                                  "target_session_attrs",
+                                  "application_name",
+                                  "dbname",
+                                  "client_encoding",
+                                  nullptr};
+  const char* const values[] = {"5", "10000", "read-write", "meshwright", url.c_str(), "UTF8", nullptr};
+  std::unique_ptr<PostgresConnection> opened(
+      new PostgresConnection(PQconnectdbParams(keywords, values, /*expand_dbname=*/1), description));
+  if (PQstatus(opened->connection_) != CONNECTION_OK) {
+    PostgresError error = opened->ConnectionError("cannot connect");
+    // A server that answers, and still lets nobody in, will not do so a moment later: a wrong password or database.
+    const PGPing ping = PQpingParams(keywords, values, /*expand_dbname=*/1);
+    if (ping == PQPING_OK) {
+      error = {PostgresFault::kFinal, absl::PermissionDeniedError(error.status.message())};
+    } else if (ping == PQPING_NO_ATTEMPT) {
+      error = {PostgresFault::kFinal, absl::InvalidArgumentError(error.status.message())};
+    }
+    return error;
+  }
+  PQsetNoticeProcessor(
+      opened->connection_, [](void*, const char*) {}, nullptr);
+  *connection = std::move(opened);
+  return {};
+}
+
+bool PostgresConnection::IsReusable() const {
+  return PQstatus(connection_) == CONNECTION_OK && PQtransactionStatus(connection_) == PQTRANS_IDLE;
+}
+
+PostgresError PostgresConnection::ConnectionError(const std::string& what) {
+  std::string reason = PQerrorMessage(connection_);
+  absl::StripTrailingAsciiWhitespace(&reason);
+  return {PostgresFault::kBroken,
+          absl::UnavailableError(absl::StrCat(description_, ": ", what, reason.empty() ? "" : ": ", reason))};
+}
+
+PostgresError PostgresConnection::ResultError(const pg_result* result) {
+  const char* const code = PQresultErrorField(result, PG_DIAG_SQLSTATE);
+  // No code: libpq itself gave up, since the connection is gone.
+  if (code == nullptr || PQstatus(connection_) != CONNECTION_OK) return ConnectionError("the connection broke");
+  const char* const primary = PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
+  return Classify(code, absl::StrCat(description_, ": ", primary == nullptr ? "unknown error" : primary));
+}
+
+bool PostgresConnection::WaitForInput(absl::Time deadline) {
+  while (PQisBusy(connection_) != 0) {
+    const absl::Duration left = deadline - absl::Now();
+    if (left <= absl::ZeroDuration()) return false;
+    pollfd socket = {.fd = PQsocket(connection_), .events = POLLIN, .revents = 0};
+    const int ready = ::poll(&socket, 1, static_cast<int>(absl::ToInt64Milliseconds(left)) + 1);
+    if (ready < 0 && errno != EINTR) return false;
+    if (ready > 0 && PQconsumeInput(connection_) == 0) return false;
+  }
+  return true;
+}
+
+PostgresError PostgresConnection::Receive(absl::Time deadline, SqlResult* result) {
+  PostgresError error;
+  while (true) {
+    if (!WaitForInput(deadline)) return ConnectionError("no answer");
+    const ResultOwner got(PQgetResult(connection_), &PQclear);
+    if (got == nullptr) return error;
+    const ExecStatusType status = PQresultStatus(got.get());
+    if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) {
+      error = ResultError(got.get());
+      if (error.fault == PostgresFault::kBroken) return error;
+      continue;
+    }
+    result->rows.clear();
+    const int columns = PQnfields(got.get());
+    for (int row = 0; row < PQntuples(got.get()); ++row) {
+      std::vector<std::string> values;
+      values.reserve(static_cast<size_t>(columns));
+      for (int column = 0; column < columns; ++column) {
+        values.emplace_back(PQgetvalue(got.get(), row, column),
+                            static_cast<size_t>(PQgetlength(got.get(), row, column)));
+      }
+      result->rows.emplace_back(std::move(values));
+    }
+    result->changed = std::atoll(PQcmdTuples(got.get()));
+  }
+}
+
+PostgresError PostgresConnection::Execute(const std::string& sql, absl::Time deadline, SqlResult* result) {
+  if (PQsendQuery(connection_, sql.c_str()) == 0) return ConnectionError("cannot send");
+  return Receive(deadline, result);
+}
+
+PostgresError PostgresConnection::Run(const std::string& name, const PostgresStatement& statement,
+                                      const SqlParameters& parameters, absl::Time deadline, SqlResult* result) {
+  std::vector<std::string> texts(statement.parameters.size());
+  std::vector<const char*> values(statement.parameters.size(), nullptr);
+  for (size_t i = 0; i < values.size(); ++i) {
+    const auto given = std::find_if(parameters.begin(), parameters.end(),
+                                    [&](const auto& parameter) { return parameter.first == statement.parameters[i]; });
+    MW_CHECK(given != parameters.end());
+    if (std::holds_alternative<std::nullopt_t>(given->second)) continue;
+    const auto* integer = std::get_if<int64_t>(&given->second);
+    texts[i] = integer != nullptr ? absl::StrCat(*integer) : std::get<std::string>(given->second);
+    // libpq would silently end the text there.
+    if (texts[i].find('\0') != std::string::npos) {
+      return {PostgresFault::kFinal,
+              absl::InvalidArgumentError(absl::StrCat(given->first, " has a zero byte, expected text"))};
+    }
+    values[i] = texts[i].c_str();
+  }
+  if (prepared_.count(name) == 0) {
+    if (PQsendPrepare(connection_, name.c_str(), statement.sql.c_str(), 0, nullptr) == 0) {
+      return ConnectionError("cannot send");
+    }
+    PostgresError error = Receive(deadline, result);
+    if (!error.status.ok()) return error;
+    prepared_.insert(name);
+  }
+  if (PQsendQueryPrepared(connection_, name.c_str(), static_cast<int>(values.size()), values.data(), nullptr, nullptr,
+                          /*resultFormat=*/0) == 0) {
+    return ConnectionError("cannot send");
+  }
+  return Receive(deadline, result);
+}
+
+PostgresError PostgresConnection::Migrate(absl::Time deadline) {
+  SqlResult result;
+  PostgresError error =
+      Execute(absl::StrCat("BEGIN; SELECT pg_advisory_xact_lock(", kMigrationLock,
+                           "); CREATE TABLE IF NOT EXISTS meshwright_migrations (number BIGINT PRIMARY "
+                           "KEY, file TEXT NOT NULL, applied_at TIMESTAMPTZ NOT NULL DEFAULT now()); "
+                           "SELECT coalesce(max(number), 0) FROM meshwright_migrations"),
+              deadline, &result);
+  if (!error.status.ok()) return error;
+  const auto& migrations = PostgresMigrations();
+  const auto newest = static_cast<int64_t>(migrations.size());
+  const int64_t version = result.rows.front().Integer(0);
+  if (version > newest) {
+    return {PostgresFault::kFinal, absl::FailedPreconditionError(absl::StrCat(
+                                       description_, ": written by a newer version of the program (schema ", version,
+                                       ", this one knows ", newest, ")"))};
+  }
+  for (int64_t number = version + 1; number <= newest; ++number) {
+    const auto& [file, sql] = migrations[static_cast<size_t>(number - 1)];
+    error = Execute(
+        absl::StrCat(sql, "\nINSERT INTO meshwright_migrations (number, file) VALUES (", number, ", '", file, "')"),
+        deadline, &result);
+    if (!error.status.ok()) return error;
+  }
+  return Execute("COMMIT", deadline, &result);
+}
+
+}  // namespace meshwright

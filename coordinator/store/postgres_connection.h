@@ -1,0 +1,75 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <absl/time/time.h>
+
+#include "coordinator/store/sql_database.h"
+
+struct pg_conn;
+struct pg_result;
+
+namespace meshwright {
+
+// What may be done about an error.
+enum class PostgresFault {
+  kFinal,      // nothing: the statement is refused
+  kTransient,  // the same again (deadlock, serialization failure); nothing was changed
+  kBroken,     // the same over a new connection; the statement may have taken effect or not
+};
+
+struct PostgresError {
+  PostgresFault fault = PostgresFault::kFinal;
+  absl::Status status;  // OK: no error
+};
+
+// Statements with ":name" parameters as PostgreSQL takes them: "$1" with the names in order.
+struct PostgresStatement {
+  std::string sql;
+  std::vector<std::string> parameters;
+};
+PostgresStatement NumberParameters(const std::string& sql);
+
+// Where a connection string leads, to name it in messages: "PostgreSQL at host:port/database", never a password.
+// InvalidArgument when it is none.
+absl::StatusOr<std::string> DescribePostgresUrl(const std::string& url);
+
+// One session. Statements are prepared when they are used first. No call waits for the server longer than until its
+// deadline. Not thread-safe.
+class PostgresConnection {
+ public:
+  static PostgresError Open(const std::string& url, const std::string& description,
+                            std::unique_ptr<PostgresConnection>* connection);
+  PostgresConnection(const PostgresConnection&) = delete;
+  PostgresConnection& operator=(const PostgresConnection&) = delete;
+  ~PostgresConnection();
+
+  PostgresError Run(const std::string& name, const PostgresStatement& statement, const SqlParameters& parameters,
+                    absl::Time deadline, SqlResult* result);
+  // Applies the migrations that the database lacks, in one transaction. Coordinators that start at once wait for each
+  // other (an advisory lock).
+  PostgresError Migrate(absl::Time deadline);
+  // Alive as far as is known, and not left inside a transaction.
+  bool IsReusable() const;
+
+ private:
+  PostgresConnection(pg_conn* connection, std::string description);
+  PostgresError Execute(const std::string& sql, absl::Time deadline, SqlResult* result);
+  // The results of what was sent; `result` gets the rows of the last.
+  PostgresError Receive(absl::Time deadline, SqlResult* result);
+  bool WaitForInput(absl::Time deadline);
+  PostgresError ConnectionError(const std::string& what);
+  PostgresError ResultError(const pg_result* result);
+
+  pg_conn* const connection_;
+  const std::string description_;
+  std::set<std::string> prepared_;
+};
+
+}  // namespace meshwright

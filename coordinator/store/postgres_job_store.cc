@@ -1,0 +1,135 @@
+#include "coordinator/store/postgres_job_store.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+#include <absl/time/clock.h>
+
+#include "common/base/check.h"
+#include "common/base/status_macros.h"
+#include "coordinator/store/postgres_connection.h"
+#include "coordinator/store/sql_job_store.h"
+
+namespace meshwright {
+
+// Compiled in from sql/postgres (see CMakeLists.txt).
+const std::vector<std::pair<std::string, std::string>>& PostgresStatements();
+
+namespace {
+
+constexpr int kTransientAttempts = 10;
+constexpr absl::Duration kFirstPause = absl::Milliseconds(20);
+constexpr absl::Duration kLongestPause = absl::Seconds(1);
+
+class PostgresDatabase : public SqlDatabase {
+ public:
+  PostgresDatabase(std::string url, std::string description, const PostgresOptions& options)
+      : url_(std::move(url)), description_(std::move(description)), options_(options) {
+    for (const auto& files : {CommonStatements(), PostgresStatements()}) {
+      for (const auto& [name, sql] : ParseSqlStatements(files)) statements_[name] = NumberParameters(sql);
+    }
+  }
+
+  absl::Status Migrate() {
+    return Attempt([](PostgresConnection& connection, absl::Time deadline) { return connection.Migrate(deadline); });
+  }
+
+  absl::StatusOr<SqlResult> Run(const std::string& name, const SqlParameters& parameters) override {
+    const auto statement = statements_.find(name);
+    MW_CHECK(statement != statements_.end());
+    SqlResult result;
+    MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Time deadline) {
+      return connection.Run(name, statement->second, parameters, deadline, &result);
+    }));
+    return result;
+  }
+
+  absl::StatusOr<absl::Time> Now() override {
+    MW_ASSIGN_OR_RETURN(const SqlResult result, Run("now", {}));
+    return result.rows.front().Time(0);
+  }
+
+ private:
+  using Action = std::function<PostgresError(PostgresConnection&, absl::Time deadline)>;
+
+  // Runs the action until it succeeds, is refused, or patience ends.
+  absl::Status Attempt(const Action& action) {
+    const absl::Time deadline = absl::Now() + options_.patience;
+    std::unique_ptr<PostgresConnection> connection;
+    if (!TakeTurn(deadline, &connection)) {
+      return absl::UnavailableError(
+          absl::StrCat(description_, ": all ", options_.connections, " connections are busy"));
+    }
+    int transient_errors = 0;
+    absl::Duration pause = kFirstPause;
+    PostgresError error;
+    while (true) {
+      const bool is_new = connection == nullptr;
+      if (is_new) error = PostgresConnection::Open(url_, description_, &connection);
+      if (connection != nullptr) {
+        error = action(*connection, deadline);
+        if (error.status.ok()) break;
+      }
+      if (error.fault == PostgresFault::kBroken) connection.reset();
+      if (error.fault == PostgresFault::kFinal) break;
+      if (error.fault == PostgresFault::kTransient && ++transient_errors == kTransientAttempts) break;
+      if (absl::Now() + pause >= deadline) break;
+      // A connection that lay in the pool may have died long ago: no reason to wait before making a new one.
+      if (error.fault == PostgresFault::kBroken && !is_new) continue;
+      absl::SleepFor(pause);
+      pause = std::min(2 * pause, kLongestPause);
+    }
+    EndTurn(std::move(connection));
+    return error.status;
+  }
+
+  // Waits until fewer than the allowed number of calls are under way; `connection` is an idle one if there is any.
+  bool TakeTurn(absl::Time deadline, std::unique_ptr<PostgresConnection>* connection) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (!freed_.wait_until(lock, absl::ToChronoTime(deadline), [&] { return running_ < options_.connections; })) {
+      return false;
+    }
+    ++running_;
+    if (!idle_.empty()) {
+      *connection = std::move(idle_.back());
+      idle_.pop_back();
+    }
+    return true;
+  }
+
+  void EndTurn(std::unique_ptr<PostgresConnection> connection) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      --running_;
+      if (connection != nullptr && connection->IsReusable()) idle_.push_back(std::move(connection));
+    }
+    freed_.notify_one();
+  }
+
+  const std::string url_;
+  const std::string description_;
+  const PostgresOptions options_;
+  std::map<std::string, PostgresStatement> statements_;
+
+  std::mutex mutex_;
+  std::condition_variable freed_;
+  std::vector<std::unique_ptr<PostgresConnection>> idle_;
+  int running_ = 0;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<JobStore>> OpenPostgresJobStore(const std::string& url, const PostgresOptions& options) {
+  MW_ASSIGN_OR_RETURN(std::string description, DescribePostgresUrl(url));
+  auto database = std::make_unique<PostgresDatabase>(url, std::move(description), options);
+  MW_RETURN_IF_ERROR(database->Migrate());
+  return std::make_unique<SqlJobStore>(std::move(database));
+}
+
+}  // namespace meshwright
