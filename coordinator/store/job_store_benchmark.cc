@@ -22,9 +22,9 @@ class TestStore {
  public:
   explicit TestStore(bool postgres) {
     if (postgres) {
-      const auto server = SharedTestPostgres();
+      static const auto server = PostgresServer::Start(/*durable=*/true);
       MW_CHECK(server.ok());
-      schema_.emplace(*server);
+      schema_.emplace((*server)->url());
       store_ = *OpenPostgresJobStore(schema_->url());
     } else {
       folder_ = (std::filesystem::temp_directory_path() / "store_benchmark_XXXXXX").string();

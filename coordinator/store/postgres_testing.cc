@@ -39,8 +39,9 @@ absl::StatusOr<std::string> DevPostgres(const std::string& arguments) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<PostgresServer>> PostgresServer::Start() {
-  MW_ASSIGN_OR_RETURN(std::string folder, DevPostgres(absl::StrCat("start --while ", ::getpid())));
+absl::StatusOr<std::unique_ptr<PostgresServer>> PostgresServer::Start(bool durable) {
+  MW_ASSIGN_OR_RETURN(std::string folder,
+                      DevPostgres(absl::StrCat("start --while ", ::getpid(), durable ? " --durable" : "")));
   std::unique_ptr<PostgresServer> server(new PostgresServer(std::move(folder)));
   MW_ASSIGN_OR_RETURN(server->url_, DevPostgres(absl::StrCat("url ", server->folder_)));
   return server;

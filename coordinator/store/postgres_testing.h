@@ -10,8 +10,8 @@ namespace meshwright {
 // A PostgreSQL server of the test's own, made by scripts/dev-postgres; gone with the object, or with the process.
 class PostgresServer {
  public:
-  // NotFound when PostgreSQL is not installed.
-  static absl::StatusOr<std::unique_ptr<PostgresServer>> Start();
+  // NotFound when PostgreSQL is not installed. `durable`: it syncs to the disk, as a server for others would.
+  static absl::StatusOr<std::unique_ptr<PostgresServer>> Start(bool durable = false);
   PostgresServer(const PostgresServer&) = delete;
   PostgresServer& operator=(const PostgresServer&) = delete;
   ~PostgresServer();
