@@ -59,6 +59,8 @@ void VisitOptions(Options& options, Visitor&& visit) {
 
   group = "Growing (3.6)";
   visit(group, "patch-radius", scoring.window_radius, "s: patches are compared on (2 s + 1)^2 pixels");
+  visit(group, "similarity-scale", scoring.similarity_scale,
+        "pixels of a window that differ so much from its centre count 1/e, grey levels");
   visit(group, "min-texture", scoring.min_texture_sigma, "standard deviation that a window must have, grey levels");
   visit(group, "min-quality", growing.min_quality, "photo-consistency that a grown patch must reach, -1..1");
   visit(group, "max-quality-deficit", growing.max_quality_deficit,
@@ -79,6 +81,8 @@ void VisitOptions(Options& options, Visitor&& visit) {
         "rounds of moving depth to the peak of photo-consistency; 0 keeps the paper's steps");
 
   group = "Acceptance (3.7)";
+  visit(group, "max-surfaces", options.conductor.max_surfaces,
+        "surfaces of overlapping cameras that one camera is held against, the largest ones");
   visit(group, "support-radius", acceptance.support_radius_steps, "supporting patches lie this near, d_r");
 
   group = "Joining";

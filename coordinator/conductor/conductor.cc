@@ -25,6 +25,17 @@ absl::StatusOr<std::shared_ptr<const PatchLattice>> LoadSurface(BlobStore& blobs
 
 std::string Name(SequenceNumber sequence) { return absl::StrCat("camera job ", sequence); }
 
+// Keeps the `count` surfaces with the most patches, in ascending order of cameras. Ties: the lower camera.
+template <typename Surface>
+void KeepLargest(int count, std::vector<Surface>& surfaces) {
+  if (surfaces.size() <= static_cast<size_t>(count)) return;
+  std::sort(surfaces.begin(), surfaces.end(), [](const Surface& a, const Surface& b) {
+    return a.patches != b.patches ? a.patches > b.patches : a.camera < b.camera;
+  });
+  surfaces.resize(static_cast<size_t>(count));
+  std::sort(surfaces.begin(), surfaces.end(), [](const Surface& a, const Surface& b) { return a.camera < b.camera; });
+}
+
 }  // namespace
 
 absl::Status ConductorOptions::Validate() const {
@@ -32,6 +43,9 @@ absl::Status ConductorOptions::Validate() const {
   MW_RETURN_IF_ERROR(overlap.Validate());
   MW_RETURN_IF_ERROR(targets.Validate());
   MW_RETURN_IF_ERROR(acceptance.Validate());
+  if (max_surfaces < 1) {
+    return absl::InvalidArgumentError(absl::StrCat("max_surfaces is ", max_surfaces, ", expected >= 1"));
+  }
   return ScheduleOptions{.window = window, .max_overlap_in_flight = acceptance.k_a}.Validate();
 }
 
@@ -183,15 +197,21 @@ absl::Status Conductor::CommitWhatIsNext() {
 absl::StatusOr<Commit> Conductor::Accept(const Assignment& assignment, const std::string& filtered_digest) {
   MW_ASSIGN_OR_RETURN(const std::shared_ptr<const PatchLattice> filtered,
                       LoadSurface(*blobs_, filtered_digest, assignment.camera));
-  std::vector<std::pair<CameraIndex, std::string>> supporters;
+  struct Supporter {
+    CameraIndex camera = 0;
+    std::string digest;
+    int64_t patches = 0;
+  };
+  std::vector<Supporter> supporters;
   for (const CameraIndex other : overlaps_.Of(assignment.camera)) {
     const auto found = committed_.find(other);
     if (found == committed_.end() || found->second.filtered_digest.empty()) continue;
-    supporters.emplace_back(other, found->second.filtered_digest);
+    supporters.push_back({other, found->second.filtered_digest, found->second.filtered_patches});
   }
+  KeepLargest(options_.max_surfaces, supporters);
   const auto load = [&](int i) {
-    const auto& [camera, digest] = supporters[static_cast<size_t>(i)];
-    return LoadSurface(*blobs_, digest, camera);
+    const Supporter& supporter = supporters[static_cast<size_t>(i)];
+    return LoadSurface(*blobs_, supporter.digest, supporter.camera);
   };
   MW_ASSIGN_OR_RETURN(const AcceptanceResult result,
                       AcceptSurface(*filtered, static_cast<int>(supporters.size()), load, options_.acceptance, *pool_));
@@ -207,6 +227,7 @@ absl::StatusOr<Commit> Conductor::Accept(const Assignment& assignment, const std
 
 void Conductor::Remember(const Commit& commit, const Outcome& outcome) {
   committed_[commit.camera] = {.filtered_digest = commit.filtered_patches > 0 ? outcome.filtered_digest : std::string(),
+                               .filtered_patches = commit.filtered_patches,
                                .accepted = {.sequence = commit.sequence,
                                             .camera = commit.camera,
                                             .digest = commit.accepted_digest,
@@ -237,6 +258,7 @@ CameraJobSpec Conductor::SpecFor(const Assignment& assignment, int64_t epoch) co
     if (found == committed_.end() || found->second.accepted.patches == 0) continue;
     if (found->second.accepted.sequence <= assignment.snapshot) spec.accepted.push_back(found->second.accepted);
   }
+  KeepLargest(options_.max_surfaces, spec.accepted);
   return spec;
 }
 

@@ -33,6 +33,11 @@ struct ConductorOptions {
   TargetSelectionOptions targets;
   int window = ScheduleOptions{}.window;  // W of the order rule, >= 1
   AcceptanceOptions acceptance;           // its k_a is also the K_a of the order rule
+  // Surfaces of overlapping cameras that one job looks at: for V_r the largest accepted ones, for acceptance the
+  // largest filtered ones, >= 1. In a dense set hundreds of cameras overlap each other and nearly all surface is in a
+  // few; what is left out may be grown once more, and the effort for a camera stays bounded whatever the size of the
+  // set.
+  int max_surfaces = 32;
 
   absl::Status Validate() const;
 };
@@ -94,7 +99,8 @@ class Conductor {
   };
   struct Committed {
     std::string filtered_digest;  // "" when there is no patch in it
-    AcceptedSurface accepted;     // its digest is "" when nothing was accepted
+    int64_t filtered_patches = 0;
+    AcceptedSurface accepted;  // its digest is "" when nothing was accepted
   };
 
   Conductor(std::string reconstruction_id, const std::vector<Camera>& cameras, FeasiblePairs pairs,
