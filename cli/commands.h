@@ -20,6 +20,10 @@ void AddInspectCommand(CLI::App& program, Run& run);
 void AddEvaluateCommand(CLI::App& program, Run& run);
 void AddSynthesizeCommand(CLI::App& program, Run& run);
 void AddRenderCommand(CLI::App& program, Run& run);
+void AddSubmitCommand(CLI::App& program, Run& run);
+void AddUpCommand(CLI::App& program, Run& run);
+// status, watch, fetch, cancel, delete, workers.
+void AddServiceCommands(CLI::App& program, Run& run);
 
 // Options that several commands share.
 struct SceneArguments {

@@ -3,21 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <absl/strings/str_cat.h>
-#include <malloc.h>
 
 #include "cli/commands.h"
 #include "cli/console.h"
-
-namespace {
-
-// Lattices and images are tens of megabytes each. The allocator would keep freed ones for later, after a while, and
-// memory would be that of the largest job times the number of threads; so large blocks always go back to the system.
-void KeepMemoryLow() {
-  mallopt(M_MMAP_THRESHOLD, 1 << 20);
-  mallopt(M_TRIM_THRESHOLD, 8 << 20);
-}
-
-}  // namespace
+#include "cli/service/program_options.h"
 
 int main(int argc, char** argv) {
   using namespace meshwright;
@@ -37,6 +26,9 @@ int main(int argc, char** argv) {
   AddEvaluateCommand(program, run);
   AddSynthesizeCommand(program, run);
   AddRenderCommand(program, run);
+  AddUpCommand(program, run);
+  AddSubmitCommand(program, run);
+  AddServiceCommands(program, run);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

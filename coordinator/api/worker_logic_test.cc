@@ -27,9 +27,9 @@ v1::HeldJob Held(const v1::CameraJob& job) {
 class WorkerLogicTest : public testing::Test {
  protected:
   void SetUp() override {
-    logic_.AddReconstruction("a", {.options_json = "{}",
-                                   .scene_digest = "digest",
-                                   .sink = [this](JobOutcome outcome) { outcomes_.push_back(std::move(outcome)); }});
+    logic_.AddReconstruction("a", {.options_json = "{}", .scene_digest = "digest", .sink = [this](JobOutcome outcome) {
+                                     outcomes_.push_back(std::move(outcome));
+                                   }});
   }
   void Offer(SequenceNumber sequence, int64_t epoch) {
     CameraJobSpec spec = {.sequence = sequence, .camera = 7, .epoch = epoch, .neighbours = {1, 2}, .targets = {2}};

@@ -46,8 +46,9 @@ absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::Make(const std::s
   }
   const auto load = [&blobs = blobs_, &scene = context->scene,
                      max_image_size](CameraIndex camera) -> absl::StatusOr<View> {
-    const SceneView& view = scene.views[static_cast<size_t>(camera)];
+    SceneView view = scene.views[static_cast<size_t>(camera)];
     MW_ASSIGN_OR_RETURN(const std::string picture, blobs.Get(view.image_path));
+    view.image_path = view.name;  // what errors should name
     return DecodeView(view, picture, max_image_size);
   };
   context->views = std::make_unique<ViewCache>(load, cache_bytes_);

@@ -1,0 +1,122 @@
+#include "cli/service/coordinator_program.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include "cli/service/parse_method.h"
+#include "common/base/clock.h"
+#include "common/base/status_macros.h"
+#include "common/base/thread_pool.h"
+#include "common/blob/filesystem_blob_store.h"
+#include "coordinator/api/reconstruction_logic.h"
+#include "coordinator/api/worker_logic.h"
+#include "coordinator/grpc/grpc_server.h"
+#include "coordinator/store/sqlite_job_store.h"
+
+namespace meshwright {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kSqliteScheme[] = "sqlite:";
+// Several times in the time of a lease, and not too often.
+constexpr int kLooksPerLease = 5;
+
+absl::StatusOr<std::unique_ptr<JobStore>> OpenStore(const CoordinatorSettings& settings) {
+  if (settings.store.empty()) return OpenSqliteJobStore(absl::StrCat(settings.data_folder, "/state.sqlite"));
+  if (absl::StartsWith(settings.store, kSqliteScheme)) {
+    return OpenSqliteJobStore(settings.store.substr(sizeof(kSqliteScheme) - 1));
+  }
+  return absl::InvalidArgumentError(absl::StrCat("--store is \"", settings.store, "\", expected sqlite:PATH"));
+}
+
+class RealCoordinatorProgram final : public CoordinatorProgram {
+ public:
+  explicit RealCoordinatorProgram(const CoordinatorSettings& settings)
+      : settings_(settings),
+        lease_{.lease = absl::Seconds(settings.lease_seconds),
+               .job_time_limit = absl::Seconds(settings.job_time_limit_seconds)},
+        pool_(settings.threads),
+        workers_(lease_, clock_) {}
+
+  ~RealCoordinatorProgram() override {
+    Shutdown(absl::Seconds(1));
+    if (!ticker_.joinable()) return;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_all();
+    ticker_.join();
+  }
+
+  absl::Status Open() {
+    MW_RETURN_IF_ERROR(lease_.Validate());
+    std::error_code error;
+    fs::create_directories(settings_.data_folder, error);
+    if (error) {
+      return absl::PermissionDeniedError(
+          absl::StrCat(settings_.data_folder, ": cannot make the folder: ", error.message()));
+    }
+    MW_ASSIGN_OR_RETURN(store_, OpenStore(settings_));
+    MW_ASSIGN_OR_RETURN(
+        blobs_, FilesystemBlobStore::Open(settings_.blobs.empty() ? absl::StrCat(settings_.data_folder, "/blobs")
+                                                                  : settings_.blobs));
+    const ConductingEnvironment environment = {.store = store_.get(),
+                                               .blobs = blobs_.get(),
+                                               .clock = &clock_,
+                                               .pool = &pool_,
+                                               .workers = &workers_,
+                                               .parse_method = ParseCoordinatorMethod};
+    MW_ASSIGN_OR_RETURN(reconstructions_,
+                        ReconstructionLogic::Open(
+                            {.data_folder = settings_.data_folder, .scene_roots = settings_.scene_roots}, environment));
+    MW_ASSIGN_OR_RETURN(server_, GrpcServer::Start(settings_.listen, *reconstructions_, workers_, *blobs_));
+    ticker_ = std::thread([this] { Tick(); });
+    return absl::OkStatus();
+  }
+
+  int port() const override { return server_->port(); }
+
+  void Shutdown(absl::Duration deadline) override {
+    if (server_ != nullptr) server_->Shutdown(deadline);
+  }
+
+ private:
+  void Tick() {
+    const auto every = absl::ToChronoMilliseconds(lease_.lease / kLooksPerLease);
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!wake_.wait_for(lock, every, [&] { return stopping_; })) workers_.ExpireLeases();
+  }
+
+  const CoordinatorSettings settings_;
+  const LeaseOptions lease_;
+  const RealClock clock_;
+  ThreadPool pool_;
+  WorkerLogic workers_;
+  std::unique_ptr<JobStore> store_;
+  std::unique_ptr<BlobStore> blobs_;
+  std::unique_ptr<ReconstructionLogic> reconstructions_;
+  std::unique_ptr<GrpcServer> server_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool stopping_ = false;
+  std::thread ticker_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<CoordinatorProgram>> CoordinatorProgram::Start(const CoordinatorSettings& settings) {
+  auto program = std::make_unique<RealCoordinatorProgram>(settings);
+  MW_RETURN_IF_ERROR(program->Open());
+  return program;
+}
+
+}  // namespace meshwright

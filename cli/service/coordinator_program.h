@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+#include <absl/time/time.h>
+
+namespace meshwright {
+
+struct CoordinatorSettings {
+  std::string listen = "127.0.0.1:7420";  // host:port; port 0 takes a free one
+  std::string data_folder;                // state, uploads, meshes
+  std::string store;                      // "sqlite:PATH"; "": sqlite in the data folder
+  std::string blobs;                      // a folder; "": in the data folder
+  std::vector<std::string> scene_roots;   // folders that scenes may be taken from by reference
+  int threads = 1;                        // for acceptance and joining
+  double lease_seconds = 30;
+  double job_time_limit_seconds = 7200;
+};
+
+// A coordinator as meshwright-coordinator and "meshwright up" run it.
+class CoordinatorProgram {
+ public:
+  static absl::StatusOr<std::unique_ptr<CoordinatorProgram>> Start(const CoordinatorSettings& settings);
+  virtual ~CoordinatorProgram() = default;
+  virtual int port() const = 0;
+  // Ends calls after `deadline` at the latest. State is safe whenever the process ends.
+  virtual void Shutdown(absl::Duration deadline) = 0;
+};
+
+}  // namespace meshwright

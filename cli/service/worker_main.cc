@@ -1,0 +1,37 @@
+#include <algorithm>
+#include <cstdio>
+#include <thread>
+
+#include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include "cli/console.h"
+#include "cli/service/program_options.h"
+
+int main(int argc, char** argv) {
+  using namespace meshwright;
+  KeepMemoryLow();
+  BlockStopSignals();
+  CLI::App program("Meshwright's worker: processes reference cameras for a coordinator.", "meshwright-worker");
+  program.set_version_flag("--version", absl::StrCat("meshwright-worker ", MW_VERSION));
+  WorkerSettings settings;
+  settings.cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  AddWorkerOptions(program, settings);
+  AddConfigOption(program);
+  try {
+    ParseWithEnvironment(program, argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return program.exit(error);
+    return FailWrongUse(absl::StrCat(error.what(), " (--help shows what is expected)"));
+  }
+  const auto worker = WorkerProgram::Make(settings);
+  if (!worker.ok()) return Fail(worker.status());
+  std::thread([&] {
+    WaitForStopSignal();
+    (*worker)->Drain();
+  }).detach();
+  (*worker)->Run();
+  // Jobs that were given back may still run: nobody waits for them.
+  std::fflush(nullptr);
+  ::_exit(kExitDone);
+}

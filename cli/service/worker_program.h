@@ -1,0 +1,29 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <absl/status/statusor.h>
+
+namespace meshwright {
+
+struct WorkerSettings {
+  std::string coordinator = "127.0.0.1:7420";  // host:port
+  std::string id;                              // "": host name and process
+  std::string blobs;                           // a folder shared with the coordinator; "": through the coordinator
+  int cores = 1;
+  int64_t memory_mib = 0;  // 0: 512 for each core, at least 1024
+  double drain_seconds = 30;
+};
+
+// A worker as meshwright-worker and "meshwright up" run it.
+class WorkerProgram {
+ public:
+  static absl::StatusOr<std::unique_ptr<WorkerProgram>> Make(const WorkerSettings& settings);
+  virtual ~WorkerProgram() = default;
+  // Until Drain() and what follows from it.
+  virtual void Run() = 0;
+  virtual void Drain() = 0;
+};
+
+}  // namespace meshwright

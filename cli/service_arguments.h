@@ -1,0 +1,29 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/console.h"
+#include "cli/service/service_client.h"
+
+namespace meshwright {
+
+// Of every command that talks to a coordinator: --coordinator, MESHWRIGHT_COORDINATOR.
+struct ServiceArguments {
+  std::string coordinator = "127.0.0.1:7420";
+  OutputSettings output;
+
+  std::unique_ptr<ServiceClient> Connect() const { return ServiceClient::Connect(coordinator); }
+};
+void AddServiceOptions(CLI::App& command, ServiceArguments& arguments);
+
+// "running", "done".
+std::string NameOf(v1::ReconstructionState state);
+// What --json prints.
+nlohmann::ordered_json ToJson(const v1::Reconstruction& reconstruction);
+// Shows progress on stderr until the reconstruction is over; the exit code says how it ended.
+int WatchUntilOver(ServiceClient& client, const std::string& id, const OutputSettings& output);
+
+}  // namespace meshwright

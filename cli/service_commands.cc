@@ -1,0 +1,191 @@
+#include <memory>
+#include <string>
+#include <utility>
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/time/clock.h>
+#include <absl/time/time.h>
+
+#include "cli/commands.h"
+#include "cli/service_arguments.h"
+
+namespace meshwright {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr char kStatePrefix[] = "RECONSTRUCTION_STATE_";
+
+struct Arguments {
+  ServiceArguments service;
+  std::string id;
+  std::string output_path;
+};
+
+void PrintReconstruction(const v1::Reconstruction& reconstruction) {
+  const v1::Progress& progress = reconstruction.progress();
+  std::printf("%-32s %-10s", reconstruction.id().c_str(), NameOf(reconstruction.state()).c_str());
+  if (reconstruction.state() == v1::RECONSTRUCTION_STATE_DONE) {
+    std::printf(" %s vertices, %s faces", FormatCount(progress.vertices()).c_str(),
+                FormatCount(progress.faces()).c_str());
+  } else if (progress.cameras_total() > 0) {
+    std::printf(" cameras %d/%d, %d with workers", progress.cameras_committed(), progress.cameras_total(),
+                progress.jobs_leased());
+  }
+  if (progress.cameras_set_aside() > 0) std::printf(", %d set aside", progress.cameras_set_aside());
+  std::printf("%s%s\n", reconstruction.failure().empty() ? "" : " ", reconstruction.failure().c_str());
+}
+
+int Show(const absl::StatusOr<v1::Reconstruction>& reconstruction, const OutputSettings& output) {
+  if (!reconstruction.ok()) return Fail(reconstruction.status());
+  if (output.json) {
+    PrintJson(ToJson(*reconstruction));
+  } else {
+    PrintReconstruction(*reconstruction);
+  }
+  return kExitDone;
+}
+
+int ShowAll(ServiceClient& client, const OutputSettings& output) {
+  Json all = Json::array();
+  std::string page_token;
+  do {
+    const absl::StatusOr<v1::ListReconstructionsResponse> page = client.List(page_token);
+    if (!page.ok()) return Fail(page.status());
+    for (const v1::Reconstruction& reconstruction : page->reconstructions()) {
+      if (output.json) {
+        all.push_back(ToJson(reconstruction));
+      } else {
+        PrintReconstruction(reconstruction);
+      }
+    }
+    page_token = page->next_page_token();
+  } while (!page_token.empty());
+  if (output.json) PrintJson({{"reconstructions", std::move(all)}});
+  return kExitDone;
+}
+
+int ShowWorkers(const Arguments& arguments) {
+  const absl::StatusOr<v1::ListWorkersResponse> response = arguments.service.Connect()->ListWorkers();
+  if (!response.ok()) return Fail(response.status());
+  Json all = Json::array();
+  for (const v1::Worker& worker : response->workers()) {
+    const double silent = absl::ToDoubleSeconds(absl::Now() - absl::FromUnixSeconds(worker.last_seen().seconds()));
+    all.push_back({{"id", worker.id()},
+                   {"cores", worker.cores()},
+                   {"memory_bytes", worker.memory_bytes()},
+                   {"jobs", worker.jobs()},
+                   {"draining", worker.draining()},
+                   {"version", worker.version()}});
+    if (arguments.service.output.json) continue;
+    std::printf("%-32s %d jobs on %d cores, %s, heard of %s ago%s\n", worker.id().c_str(), worker.jobs(),
+                worker.cores(), FormatBytes(static_cast<double>(worker.memory_bytes())).c_str(),
+                FormatDuration(silent).c_str(), worker.draining() ? ", draining" : "");
+  }
+  if (arguments.service.output.json) PrintJson({{"workers", std::move(all)}});
+  return kExitDone;
+}
+
+int Fetch(const Arguments& arguments) {
+  const absl::Status status = arguments.service.Connect()->Fetch(arguments.id, arguments.output_path);
+  if (!status.ok()) return Fail(status);
+  if (arguments.service.output.json) {
+    PrintJson({{"id", arguments.id}, {"mesh", arguments.output_path}});
+  } else {
+    std::printf("mesh     %s\n", arguments.output_path.c_str());
+  }
+  return kExitDone;
+}
+
+int Delete(const Arguments& arguments) {
+  const absl::Status status = arguments.service.Connect()->Delete(arguments.id);
+  return status.ok() ? kExitDone : Fail(status);
+}
+
+}  // namespace
+
+void AddServiceOptions(CLI::App& command, ServiceArguments& arguments) {
+  command.add_option("--coordinator", arguments.coordinator, "its host:port")
+      ->envname("MESHWRIGHT_COORDINATOR")
+      ->capture_default_str();
+  AddOutputOptions(command, arguments.output);
+}
+
+std::string NameOf(v1::ReconstructionState state) {
+  const std::string name = v1::ReconstructionState_Name(state);
+  return absl::AsciiStrToLower(name.substr(sizeof(kStatePrefix) - 1));
+}
+
+Json ToJson(const v1::Reconstruction& reconstruction) {
+  const v1::Progress& progress = reconstruction.progress();
+  Json json;
+  json["id"] = reconstruction.id();
+  json["state"] = NameOf(reconstruction.state());
+  if (!reconstruction.failure().empty()) json["failure"] = reconstruction.failure();
+  json["cameras"] = {{"total", progress.cameras_total()},
+                     {"committed", progress.cameras_committed()},
+                     {"set_aside", progress.cameras_set_aside()},
+                     {"with_workers", progress.jobs_leased()}};
+  if (reconstruction.state() == v1::RECONSTRUCTION_STATE_DONE) {
+    json["mesh"] = {{"vertices", progress.vertices()},
+                    {"faces", progress.faces()},
+                    {"bytes", reconstruction.mesh_bytes()},
+                    {"sha256", reconstruction.mesh_sha256()}};
+  }
+  return json;
+}
+
+int WatchUntilOver(ServiceClient& client, const std::string& id, const OutputSettings& output) {
+  v1::Reconstruction last;
+  const absl::Status status = client.Watch(id, [&](const v1::Reconstruction& now) {
+    const bool news =
+        now.state() != last.state() || now.progress().cameras_committed() != last.progress().cameras_committed();
+    last = now;
+    if (output.quiet || !news) return;
+    std::fprintf(stderr, "%s: %s, cameras %d/%d\n", id.c_str(), NameOf(now.state()).c_str(),
+                 now.progress().cameras_committed(), now.progress().cameras_total());
+  });
+  if (!status.ok()) return Fail(status);
+  const int shown = Show(last, output);
+  return last.state() == v1::RECONSTRUCTION_STATE_DONE ? shown : kExitFailed;
+}
+
+void AddServiceCommands(CLI::App& program, Run& run) {
+  const auto add = [&](const char* name, const char* description, const char* examples, auto&& what) {
+    auto arguments = std::make_shared<Arguments>();
+    CLI::App& command = *program.add_subcommand(name, description);
+    command.footer(absl::StrCat("Examples:\n  ", examples));
+    AddServiceOptions(command, arguments->service);
+    command.callback([arguments, what, &run] { run = [arguments, what] { return what(*arguments); }; });
+    return std::pair<CLI::App*, std::shared_ptr<Arguments>>(&command, arguments);
+  };
+  const auto add_with_id = [&](const char* name, const char* description, const char* examples, auto&& what) {
+    const auto added = add(name, description, examples, what);
+    added.first->add_option("ID", added.second->id, "the reconstruction")->required();
+    return added;
+  };
+  const auto status = add("status", "Show a submitted reconstruction, or all of them", "meshwright status my-scene",
+                          [](const Arguments& arguments) {
+                            const auto client = arguments.service.Connect();
+                            return arguments.id.empty() ? ShowAll(*client, arguments.service.output)
+                                                        : Show(client->Get(arguments.id), arguments.service.output);
+                          });
+  status.first->add_option("ID", status.second->id, "the reconstruction [all]");
+  add_with_id("watch", "Follow a submitted reconstruction until it is over", "meshwright watch my-scene",
+              [](const Arguments& arguments) {
+                return WatchUntilOver(*arguments.service.Connect(), arguments.id, arguments.service.output);
+              });
+  const auto fetch = add_with_id("fetch", "Download the mesh of a submitted reconstruction",
+                                 "meshwright fetch my-scene -o mesh.ply", Fetch);
+  fetch.first->add_option("-o,--output", fetch.second->output_path, "the mesh to write, PLY")->required();
+  add_with_id("cancel", "Stop a submitted reconstruction", "meshwright cancel my-scene",
+              [](const Arguments& arguments) {
+                return Show(arguments.service.Connect()->Cancel(arguments.id), arguments.service.output);
+              });
+  add_with_id("delete", "Stop a submitted reconstruction and remove its mesh", "meshwright delete my-scene", Delete);
+  add("workers", "Show the workers that the coordinator knows", "meshwright workers", ShowWorkers);
+}
+
+}  // namespace meshwright

@@ -1,0 +1,148 @@
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include "cli/commands.h"
+#include "cli/local/reconstruction_options.h"
+#include "cli/service_arguments.h"
+#include "common/base/status_macros.h"
+
+namespace meshwright {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kExamples[] = R"(Examples:
+  meshwright submit my-scene -o mesh.ply            # upload it, wait, download the mesh
+  meshwright submit my-scene --id first-try         # upload it; then: meshwright watch first-try
+  meshwright submit file:campaign/7 --wait          # a folder below the coordinator's --scene-root)";
+
+constexpr char kByReference[] = "file:";
+
+struct Arguments {
+  ServiceArguments service;
+  SceneArguments scene;
+  ReconstructionOptions options;
+  std::string id;
+  double weight = 1;
+  bool wait = false;
+  std::string output_path;
+};
+
+// fountain-P11 -> fountain-p11-3f9a01
+std::string DrawId(const std::string& scene) {
+  fs::path path = fs::path(scene).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  std::string id;
+  for (const char c : path.filename().string()) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain = byte < 128 && std::isalnum(byte) != 0;
+    if (plain || !id.empty()) id.push_back(plain ? static_cast<char>(std::tolower(byte)) : '-');
+  }
+  std::random_device random;
+  return absl::StrFormat("%s-%06x", id.empty() ? "scene" : id.substr(0, 50), random() & 0xFFFFFFU);
+}
+
+// Files below the scene's folder that a scene may consist of; meshes are not among them.
+absl::StatusOr<std::vector<std::string>> FilesOf(const std::string& folder) {
+  std::vector<std::string> files;
+  std::error_code error;
+  for (auto it = fs::recursive_directory_iterator(folder, error); it != fs::recursive_directory_iterator();
+       it.increment(error)) {
+    if (error) break;
+    if (absl::StartsWith(it->path().filename().string(), ".")) {
+      if (it->is_directory()) it.disable_recursion_pending();
+    } else if (it->is_regular_file() && it->path().extension() != ".ply") {
+      files.push_back(fs::path(it->path()).lexically_relative(folder).string());
+    }
+  }
+  if (error) return absl::PermissionDeniedError(absl::StrCat(folder, ": cannot be read: ", error.message()));
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+absl::Status Upload(const Arguments& arguments, ServiceClient& client) {
+  MW_ASSIGN_OR_RETURN(const std::vector<std::string> files, FilesOf(arguments.scene.path));
+  int sent = 0;
+  for (const std::string& file : files) {
+    MW_RETURN_IF_ERROR(client.Upload(arguments.id, file, (fs::path(arguments.scene.path) / file).string()));
+    if (!arguments.service.output.quiet && ++sent % 50 == 0) {
+      std::fprintf(stderr, "%s: %d/%d files uploaded\n", arguments.id.c_str(), sent, static_cast<int>(files.size()));
+    }
+  }
+  return absl::OkStatus();
+}
+
+int Submit(Arguments& arguments) {
+  if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
+    return FailWrongUse(std::string(valid.message()));
+  }
+  const bool by_reference = absl::StartsWith(arguments.scene.path, kByReference);
+  if (!by_reference) {
+    // Better known here and now than after it was uploaded.
+    if (const auto scene = LoadScene(arguments.scene); !scene.ok()) return Fail(scene.status());
+  }
+  if (arguments.id.empty()) arguments.id = DrawId(arguments.scene.path);
+  const auto client = arguments.service.Connect();
+  v1::CreateReconstructionRequest request;
+  request.set_id(arguments.id);
+  request.set_options_json(ToJson(arguments.options).dump());
+  request.set_weight(arguments.weight);
+  if (by_reference) request.set_scene_reference(arguments.scene.path);
+  const absl::StatusOr<v1::Reconstruction> created = client->Create(request);
+  if (!created.ok()) return Fail(created.status());
+  if (!by_reference && created->state() == v1::RECONSTRUCTION_STATE_CREATED) {
+    if (const absl::Status status = Upload(arguments, *client); !status.ok()) return Fail(status);
+  }
+  const absl::StatusOr<v1::Reconstruction> started = client->Start(arguments.id);
+  if (!started.ok()) return Fail(started.status());
+  const bool wait = arguments.wait || !arguments.output_path.empty();
+  if (!wait) {
+    if (arguments.service.output.json) {
+      PrintJson(ToJson(*started));
+    } else {
+      std::printf("%s\n", arguments.id.c_str());
+    }
+    return kExitDone;
+  }
+  const int ended = WatchUntilOver(*client, arguments.id, arguments.service.output);
+  if (ended != kExitDone || arguments.output_path.empty()) return ended;
+  const absl::Status fetched = client->Fetch(arguments.id, arguments.output_path);
+  return fetched.ok() ? kExitDone : Fail(fetched);
+}
+
+}  // namespace
+
+void AddSubmitCommand(CLI::App& program, Run& run) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("submit", "Have a scene reconstructed by a coordinator and its workers");
+  command.footer(kExamples);
+  command
+      .add_option("SCENE", arguments->scene.path,
+                  "folder with cameras and photographs, to be uploaded; or file:FOLDER below the coordinator's roots")
+      ->required();
+  command.add_option(
+      "--id", arguments->id,
+      "name of the reconstruction, unique: a-z, 0-9 and \"-\"; submitting again under the same name goes "
+      "on where it was [from the folder's name]");
+  command.add_option("--weight", arguments->weight, "share of the workers against other reconstructions")
+      ->check(CLI::Range(0.001, 1000.0))
+      ->capture_default_str();
+  command.add_flag("--wait", arguments->wait, "until it is over");
+  command.add_option("-o,--output", arguments->output_path, "wait and write the mesh, PLY");
+  AddServiceOptions(command, arguments->service);
+  VisitOptions(arguments->options, [&](const char* group, const char* name, auto& field, const char* help) {
+    command.add_option(absl::StrCat("--", name), field, help)->group(group)->capture_default_str();
+  });
+  command.callback([arguments, &run] { run = [arguments] { return Submit(*arguments); }; });
+}
+
+}  // namespace meshwright

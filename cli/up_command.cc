@@ -1,0 +1,77 @@
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include "cli/commands.h"
+#include "cli/service/program_options.h"
+
+namespace meshwright {
+namespace {
+
+constexpr char kExamples[] = R"(Examples:
+  meshwright up --data service
+  meshwright up --data service --workers 4 --listen 0.0.0.0:7420
+Then, from another terminal: meshwright submit my-scene -o mesh.ply
+More workers may join from other machines: meshwright-worker --coordinator HOST:7420)";
+
+constexpr double kShutdownSeconds = 5;
+
+struct Arguments {
+  CoordinatorSettings coordinator;
+  int workers = 1;
+};
+
+int Up(Arguments& arguments) {
+  BlockStopSignals();
+  CoordinatorSettings& settings = arguments.coordinator;
+  settings.threads = AvailableCores();
+  if (settings.blobs.empty()) settings.blobs = settings.data_folder + "/blobs";
+  const auto coordinator = CoordinatorProgram::Start(settings);
+  if (!coordinator.ok()) return Fail(coordinator.status());
+  std::vector<std::unique_ptr<WorkerProgram>> workers;
+  std::vector<std::thread> threads;
+  for (int i = 0; i < arguments.workers; ++i) {
+    auto worker = WorkerProgram::Make({.coordinator = absl::StrCat("127.0.0.1:", (*coordinator)->port()),
+                                       .id = absl::StrCat("local-", i + 1),
+                                       .blobs = settings.blobs,
+                                       .cores = std::max(1, AvailableCores() / arguments.workers),
+                                       .drain_seconds = 0});
+    if (!worker.ok()) return Fail(worker.status());
+    workers.push_back(*std::move(worker));
+  }
+  for (const auto& worker : workers) threads.emplace_back([&worker] { worker->Run(); });
+  std::printf("listening on port %d\n", (*coordinator)->port());
+  std::fflush(stdout);
+  WaitForStopSignal();
+  // Jobs that run are lost; whoever starts this again goes on from the last commit.
+  for (const auto& worker : workers) worker->Drain();
+  for (std::thread& thread : threads) thread.join();
+  (*coordinator)->Shutdown(absl::Seconds(kShutdownSeconds));
+  std::fflush(nullptr);
+  ::_exit(kExitDone);
+}
+
+}  // namespace
+
+void AddUpCommand(CLI::App& program, Run& run) {
+  auto arguments = std::make_shared<Arguments>();
+  arguments->coordinator.data_folder = "meshwright-data";
+  CLI::App& command = *program.add_subcommand("up", "Run a coordinator and workers on this machine");
+  command.footer(kExamples);
+  CoordinatorSettings& settings = arguments->coordinator;
+  command.add_option("--listen", settings.listen, "host:port; there is no authentication yet")->capture_default_str();
+  command.add_option("--data", settings.data_folder, "folder for everything that is kept")->capture_default_str();
+  command.add_option("--scene-root", settings.scene_roots, "folders that scenes may be taken from by reference")
+      ->delimiter(':');
+  command.add_option("--workers", arguments->workers, "that share the cores of this machine")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  command.callback([arguments, &run] { run = [arguments] { return Up(*arguments); }; });
+}
+
+}  // namespace meshwright
