@@ -30,11 +30,16 @@ class BlobStoreHarness {
   virtual void Overwrite(const std::string& digest, const std::string& bytes) = 0;
 };
 
-using MakeBlobStoreHarness = std::unique_ptr<BlobStoreHarness> (*)();
+// Null, with the reason in `skip`, where the backend cannot be had.
+using MakeBlobStoreHarness = std::unique_ptr<BlobStoreHarness> (*)(std::string* skip);
 
 class BlobStoreConformanceTest : public testing::TestWithParam<MakeBlobStoreHarness> {
  protected:
-  BlobStoreConformanceTest() : harness_(GetParam()()) {}
+  void SetUp() override {
+    std::string skip;
+    harness_ = GetParam()(&skip);
+    if (harness_ == nullptr) GTEST_SKIP() << skip;
+  }
   BlobStore& store() { return harness_->store(); }
 
   static std::string RandomBytes(uint32_t seed, size_t size) {

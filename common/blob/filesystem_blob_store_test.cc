@@ -40,7 +40,7 @@ class FilesystemHarness : public BlobStoreHarness {
   std::unique_ptr<FilesystemBlobStore> store_;
 };
 
-std::unique_ptr<BlobStoreHarness> MakeFilesystemHarness() { return std::make_unique<FilesystemHarness>(); }
+std::unique_ptr<BlobStoreHarness> MakeFilesystemHarness(std::string*) { return std::make_unique<FilesystemHarness>(); }
 
 INSTANTIATE_TEST_SUITE_P(Filesystem, BlobStoreConformanceTest, testing::Values(&MakeFilesystemHarness));
 
