@@ -5,9 +5,9 @@
 #include <absl/strings/str_cat.h>
 
 #include "cli/commands.h"
-#include "common/base/bad_input.h"
 #include "cli/local/inspection.h"
 #include "cli/local/reconstruction_options.h"
+#include "common/base/bad_input.h"
 #include "common/base/thread_pool.h"
 
 namespace meshwright {

@@ -8,9 +8,9 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
-#include "common/base/bad_input.h"
 #include "cli/local/local_reconstruction.h"
 #include "cli/progress_display.h"
+#include "common/base/bad_input.h"
 #include "common/base/clock.h"
 #include "common/base/status_macros.h"
 

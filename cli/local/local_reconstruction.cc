@@ -11,19 +11,18 @@
 #include <absl/strings/str_format.h>
 #include <absl/time/clock.h>
 
-#include "common/base/bad_input.h"
 #include "cli/local/report.h"
-#include "common/scene/scene_check.h"
-#include "worker/job_input/view_cache.h"
 #include "cli/local/work_folder.h"
+#include "common/base/bad_input.h"
 #include "common/base/clock.h"
 #include "common/base/files.h"
 #include "common/base/process_usage.h"
 #include "common/base/status_macros.h"
-#include "common/mesh/joined_mesh.h"
 #include "common/mesh/surface_union.h"
+#include "common/scene/scene_check.h"
 #include "common/scene/view.h"
-#include "common/surface/codec.h"
+#include "coordinator/conductor/accepted_mesh.h"
+#include "worker/job_input/view_cache.h"
 
 namespace meshwright {
 namespace {
@@ -53,11 +52,6 @@ void RemovePartialFiles(const std::string& path) {
   }
 }
 
-absl::StatusOr<PatchLattice> LoadAccepted(BlobStore& blobs, const AcceptedSurface& surface) {
-  MW_ASSIGN_OR_RETURN(const std::string bytes, blobs.Get(surface.digest));
-  return DecodeSurface(bytes);
-}
-
 // NNNN_name.ply, in the order of commits.
 std::string PartName(const Scene& scene, const AcceptedSurface& surface) {
   std::string name = fs::path(scene.views[static_cast<size_t>(surface.camera)].name).stem().string();
@@ -78,7 +72,7 @@ absl::Status MakePartsFolder(const std::string& path) {
 absl::Status WriteParts(const Scene& scene, const std::vector<AcceptedSurface>& surfaces, BlobStore& blobs,
                         const std::string& folder) {
   for (const AcceptedSurface& accepted : surfaces) {
-    MW_ASSIGN_OR_RETURN(const PatchLattice surface, LoadAccepted(blobs, accepted));
+    MW_ASSIGN_OR_RETURN(const PatchLattice surface, LoadAcceptedSurface(blobs, accepted));
     MW_RETURN_IF_ERROR(WriteSurfacePart(surface, absl::StrCat(folder, "/", PartName(scene, accepted))));
   }
   return absl::OkStatus();
@@ -196,12 +190,9 @@ class LocalReconstruction {
     }
     const auto count = static_cast<int>(surfaces.size());
     int loaded = 0;  // each at least twice
-    const auto load = [&](int64_t i) {
-      Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count);
-      return LoadAccepted(work_->blobs(), surfaces[static_cast<size_t>(i)]);
-    };
-    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts,
-                        WriteJoinedMesh(count, load, options_.join, settings_.output_path, pool_));
+    const auto loading = [&] { Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count); };
+    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts, WriteAcceptedMesh(surfaces, work_->blobs(), options_.join,
+                                                                         settings_.output_path, pool_, loading));
     Json report = MakeReport(counts, std::move(cameras));
     MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, report.dump(2) + "\n"));
     Tell(LocalStage::kJoining, count, count);
