@@ -65,6 +65,14 @@ struct LeaseRequest {
   absl::Time now;
 };
 
+// A camera that was chosen.
+struct CameraAssignment {
+  SequenceNumber sequence = 0;
+  CameraIndex camera = 0;
+  SequenceNumber snapshot = 0;
+  int64_t memory_bytes = 0;
+};
+
 struct CameraLease {
   std::string reconstruction_id;
   CameraJob job;  // with the epoch, the worker and the expiry of the lease
@@ -175,6 +183,11 @@ class JobStore {
   // surface must be durable already. Repeating the same commit is OK.
   virtual absl::Status AddCommit(const std::string& id, const Commit& commit, absl::Time now,
                                  int64_t conductor_epoch = 0) = 0;
+  // AddCommit for each, then AssignCameraJob for each, in one transaction: one wait for the disk instead of many. When
+  // one of them is refused, those before it may stand.
+  virtual absl::Status Advance(const std::string& id, const std::vector<Commit>& commits,
+                               const std::vector<CameraAssignment>& assignments, absl::Time now,
+                               int64_t conductor_epoch = 0) = 0;
   // By sequence, those with a number greater than `after`.
   virtual absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after = 0) = 0;
 

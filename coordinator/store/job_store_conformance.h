@@ -484,6 +484,29 @@ TEST_P(JobStoreConformance, NobodyConductsInVainWhenManyTry) {
   EXPECT_EQ(won[0] + won[1] + won[2] + won[3], 1);
 }
 
+TEST_P(JobStoreConformance, CommitsAndChoicesAdvanceTogether) {
+  ASSERT_EQ(*store().AcquireConductorLease("castle", "north", kNow + kLease, kNow), 1);
+  ASSERT_TRUE(store().Advance("castle", {}, {{1, 7, 0, 5}, {2, 3, 0, 6}}, kNow, 1).ok());
+  ASSERT_TRUE(store().Advance("castle", {}, {}, kNow, 1).ok());
+  for (int s = 1; s <= 2; ++s) {
+    ASSERT_TRUE(store().CompleteCameraJob("castle", s, 1, Digest('a'), {}, "{}", kNow).ok());
+  }
+  const std::vector<Commit> commits = {{1, 7, Digest('b'), 9, 4}, {2, 3, "", 0, 0}};
+  const std::vector<CameraAssignment> choices = {{3, 5, 2, 0}};
+  EXPECT_TRUE(absl::IsAborted(store().Advance("castle", commits, choices, kNow, 2)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(store().Advance("castle", {commits[1]}, choices, kNow, 1)));
+  EXPECT_TRUE(store().ListCommits("castle")->empty());
+  EXPECT_EQ(store().ListCameraJobs("castle")->size(), 2);
+  EXPECT_TRUE(store().Advance("castle", commits, choices, kNow, 1).ok());
+  EXPECT_TRUE(store().Advance("castle", commits, choices, kNow, 1).ok());
+  // A part of it is there already.
+  EXPECT_TRUE(store().Advance("castle", {commits[1]}, {{3, 5, 2, 0}, {4, 6, 2, 0}}, kNow, 1).ok());
+  Reopen();
+  EXPECT_THAT(*store().ListCommits("castle"), testing::ElementsAreArray(commits));
+  EXPECT_EQ(store().ListCameraJobs("castle")->size(), 4);
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->memory_bytes, 5);
+}
+
 // The life of a reconstruction.
 
 TEST_P(JobStoreConformance, AReconstructionRunsOnceItsSceneIsThere) {

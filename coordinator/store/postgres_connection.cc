@@ -221,6 +221,11 @@ PostgresError PostgresConnection::Run(const std::string& name, const PostgresSta
   return Receive(deadline, result);
 }
 
+PostgresError PostgresConnection::RunCommand(const std::string& command, absl::Time deadline) {
+  SqlResult ignored;
+  return Execute(command, deadline, &ignored);
+}
+
 PostgresError PostgresConnection::Migrate(absl::Time deadline) {
   SqlResult result;
   PostgresError error =

@@ -52,6 +52,8 @@ class PostgresConnection {
 
   PostgresError Run(const std::string& name, const PostgresStatement& statement, const SqlParameters& parameters,
                     absl::Time deadline, SqlResult* result);
+  // BEGIN, COMMIT or ROLLBACK.
+  PostgresError RunCommand(const std::string& command, absl::Time deadline);
   // Applies the migrations that the database lacks, in one transaction. Coordinators that start at once wait for each
   // other (an advisory lock).
   PostgresError Migrate(absl::Time deadline);

@@ -50,6 +50,24 @@ class PostgresDatabase : public SqlDatabase {
     return result;
   }
 
+  absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>& calls) override {
+    bool all_changed = true;
+    MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Time deadline) {
+      all_changed = true;
+      PostgresError error = connection.RunCommand("BEGIN", deadline);
+      for (const SqlCall& call : calls) {
+        if (!error.status.ok() || !all_changed) break;
+        SqlResult result;
+        error = connection.Run(call.statement, statements_.at(call.statement), call.parameters, deadline, &result);
+        all_changed = result.changed == 1;
+      }
+      if (error.status.ok() && all_changed) return connection.RunCommand("COMMIT", deadline);
+      const PostgresError rollback = connection.RunCommand("ROLLBACK", deadline);
+      return error.status.ok() ? rollback : error;
+    }));
+    return all_changed;
+  }
+
   absl::StatusOr<absl::Time> Now() override {
     MW_ASSIGN_OR_RETURN(const SqlResult result, Run("now", {}));
     return result.rows.front().Time(0);

@@ -35,12 +35,20 @@ struct SqlResult {
   int64_t changed = 0;  // rows that an INSERT, UPDATE or DELETE changed
 };
 
+struct SqlCall {
+  std::string statement;
+  SqlParameters parameters;
+};
+
 // What SqlJobStore needs of a database. Thread-safe.
 class SqlDatabase {
  public:
   virtual ~SqlDatabase() = default;
   // Runs one statement of the sql folder as one durable transaction. Errors are those of JobStore.
   virtual absl::StatusOr<SqlResult> Run(const std::string& statement, const SqlParameters& parameters) = 0;
+  // Runs several, each of which must change exactly one row, as one durable transaction. False: one of them did not,
+  // and nothing was changed.
+  virtual absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>& calls) = 0;
   virtual absl::StatusOr<absl::Time> Now() = 0;
 };
 

@@ -45,6 +45,29 @@ absl::Status NoReconstruction(const std::string& id) {
   return absl::NotFoundError(absl::StrCat("no reconstruction ", id));
 }
 
+SqlCall AssignCall(const std::string& id, const CameraAssignment& assignment, absl::Time now, int64_t conductor_epoch) {
+  return {"assign_camera_job",
+          {{"id", id},
+           {"sequence", assignment.sequence},
+           {"camera", assignment.camera},
+           {"snapshot", assignment.snapshot},
+           {"now", absl::ToUnixMicros(now)},
+           {"memory_bytes", assignment.memory_bytes},
+           {"conductor_epoch", conductor_epoch}}};
+}
+
+SqlCall CommitCall(const std::string& id, const Commit& commit, absl::Time now, int64_t conductor_epoch) {
+  return {"add_commit",
+          {{"id", id},
+           {"sequence", commit.sequence},
+           {"camera", commit.camera},
+           {"accepted_digest", NullIfEmpty(commit.accepted_digest)},
+           {"filtered_patches", commit.filtered_patches},
+           {"accepted_patches", commit.accepted_patches},
+           {"now", absl::ToUnixMicros(now)},
+           {"conductor_epoch", conductor_epoch}}};
+}
+
 }  // namespace
 
 std::string CameraJobName(const std::string& id, SequenceNumber sequence) {
@@ -137,14 +160,8 @@ absl::Status SqlJobStore::DeleteReconstruction(const std::string& id) {
 absl::Status SqlJobStore::AssignCameraJob(const std::string& id, SequenceNumber sequence, CameraIndex camera,
                                           SequenceNumber snapshot, absl::Time now, int64_t conductor_epoch,
                                           int64_t memory_bytes) {
-  MW_ASSIGN_OR_RETURN(const SqlResult result,
-                      database_->Run("assign_camera_job", {{"id", id},
-                                                           {"sequence", sequence},
-                                                           {"camera", camera},
-                                                           {"snapshot", snapshot},
-                                                           {"now", absl::ToUnixMicros(now)},
-                                                           {"memory_bytes", memory_bytes},
-                                                           {"conductor_epoch", conductor_epoch}}));
+  const SqlCall call = AssignCall(id, {sequence, camera, snapshot, memory_bytes}, now, conductor_epoch);
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(call.statement, call.parameters));
   if (result.changed == 1) return absl::OkStatus();
   MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
   const absl::StatusOr<CameraJob> stored = GetCameraJob(id, sequence);
@@ -218,15 +235,8 @@ absl::StatusOr<std::vector<CameraJob>> SqlJobStore::ListCameraJobs(const std::st
 
 absl::Status SqlJobStore::AddCommit(const std::string& id, const Commit& commit, absl::Time now,
                                     int64_t conductor_epoch) {
-  MW_ASSIGN_OR_RETURN(const SqlResult result,
-                      database_->Run("add_commit", {{"id", id},
-                                                    {"sequence", commit.sequence},
-                                                    {"camera", commit.camera},
-                                                    {"accepted_digest", NullIfEmpty(commit.accepted_digest)},
-                                                    {"filtered_patches", commit.filtered_patches},
-                                                    {"accepted_patches", commit.accepted_patches},
-                                                    {"now", absl::ToUnixMicros(now)},
-                                                    {"conductor_epoch", conductor_epoch}}));
+  const SqlCall call = CommitCall(id, commit, now, conductor_epoch);
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(call.statement, call.parameters));
   if (result.changed == 1) return absl::OkStatus();
   MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
   MW_ASSIGN_OR_RETURN(const SqlResult stored,
@@ -234,6 +244,28 @@ absl::Status SqlJobStore::AddCommit(const std::string& id, const Commit& commit,
   if (!stored.rows.empty() && ReadCommit(stored.rows.front()) == commit) return absl::OkStatus();
   return absl::FailedPreconditionError(
       absl::StrCat("commit ", commit.sequence, " of reconstruction ", id, " is another one already"));
+}
+
+absl::Status SqlJobStore::Advance(const std::string& id, const std::vector<Commit>& commits,
+                                  const std::vector<CameraAssignment>& assignments, absl::Time now,
+                                  int64_t conductor_epoch) {
+  std::vector<SqlCall> calls;
+  calls.reserve(commits.size() + assignments.size());
+  for (const Commit& commit : commits) calls.push_back(CommitCall(id, commit, now, conductor_epoch));
+  for (const CameraAssignment& assignment : assignments) {
+    calls.push_back(AssignCall(id, assignment, now, conductor_epoch));
+  }
+  if (calls.empty()) return absl::OkStatus();
+  const absl::StatusOr<bool> done = database_->RunTogether(calls);
+  if (done.ok() && *done) return absl::OkStatus();
+  if (absl::IsUnavailable(done.status())) return done.status();
+  // Something is there already, or is refused: one by one tells which, and why.
+  for (const Commit& commit : commits) MW_RETURN_IF_ERROR(AddCommit(id, commit, now, conductor_epoch));
+  for (const CameraAssignment& assignment : assignments) {
+    MW_RETURN_IF_ERROR(AssignCameraJob(id, assignment.sequence, assignment.camera, assignment.snapshot, now,
+                                       conductor_epoch, assignment.memory_bytes));
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::vector<Commit>> SqlJobStore::ListCommits(const std::string& id, SequenceNumber after) {

@@ -50,6 +50,9 @@ class SqlJobStore : public JobStore {
   absl::StatusOr<std::vector<CameraLease>> ListLeases(const std::string& worker) override;
 
   absl::Status AddCommit(const std::string& id, const Commit& commit, absl::Time now, int64_t conductor_epoch) override;
+  absl::Status Advance(const std::string& id, const std::vector<Commit>& commits,
+                       const std::vector<CameraAssignment>& assignments, absl::Time now,
+                       int64_t conductor_epoch) override;
   absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after) override;
 
   absl::StatusOr<int64_t> AcquireConductorLease(const std::string& id, const std::string& owner, absl::Time expires_at,

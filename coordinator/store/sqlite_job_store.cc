@@ -18,6 +18,29 @@ class SqliteDatabase : public SqlDatabase {
 
   absl::StatusOr<SqlResult> Run(const std::string& name, const SqlParameters& parameters) override {
     const std::lock_guard<std::mutex> lock(mutex_);
+    return RunLocked(name, parameters);
+  }
+
+  absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>& calls) override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    bool all_changed = true;
+    const absl::Status status = connection_.Transaction([&]() -> absl::Status {
+      for (const SqlCall& call : calls) {
+        MW_ASSIGN_OR_RETURN(const SqlResult result, RunLocked(call.statement, call.parameters));
+        all_changed = result.changed == 1;
+        if (!all_changed) return absl::CancelledError("rolled back");
+      }
+      return absl::OkStatus();
+    });
+    if (!all_changed) return false;
+    MW_RETURN_IF_ERROR(status);
+    return true;
+  }
+
+  absl::StatusOr<absl::Time> Now() override { return clock_->Now(); }
+
+ private:
+  absl::StatusOr<SqlResult> RunLocked(const std::string& name, const SqlParameters& parameters) {
     MW_ASSIGN_OR_RETURN(SqliteStatement statement, connection_.Prepare(name));
     for (const auto& [parameter, value] : parameters) {
       const std::string bound_name = absl::StrCat(":", parameter);
@@ -34,6 +57,7 @@ class SqliteDatabase : public SqlDatabase {
       MW_ASSIGN_OR_RETURN(const bool row, statement.Step());
       if (!row) break;
       std::vector<std::string> values;
+      values.reserve(static_cast<size_t>(statement.Columns()));
       for (int column = 0; column < statement.Columns(); ++column) values.push_back(statement.Text(column));
       result.rows.emplace_back(std::move(values));
     }
@@ -41,9 +65,6 @@ class SqliteDatabase : public SqlDatabase {
     return result;
   }
 
-  absl::StatusOr<absl::Time> Now() override { return clock_->Now(); }
-
- private:
   const Clock* const clock_;
   std::mutex mutex_;
   SqliteConnection connection_;
