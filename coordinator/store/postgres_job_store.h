@@ -16,7 +16,7 @@ struct PostgresOptions {
   absl::Duration patience = absl::Seconds(30);
 };
 
-// The store of a cluster: a database of PostgreSQL 12 or newer, which several coordinators share (docs/adr/0005).
+// The store of a cluster: a database of PostgreSQL 12 or newer, which several coordinators share (docs/adr/0008).
 // `url` is a connection string of libpq, postgresql://USER@HOST:PORT/DATABASE. Opening creates the tables, or brings
 // them up to date. A call whose connection breaks is repeated over a new one, so it may have taken effect before: what
 // CreateReconstruction calls AlreadyExists may be its own, and a lease that was granted to nobody runs out.
