@@ -1,6 +1,7 @@
 #include "coordinator/store/postgres_job_store.h"
 
 #include <algorithm>
+#include <atomic>
 #include <condition_variable>
 #include <functional>
 #include <map>
@@ -85,12 +86,22 @@ class PostgresDatabase : public SqlDatabase {
           absl::StrCat(description_, ": all ", options_.connections, " connections are busy"));
     }
     int transient_errors = 0;
+    int refusals = 0;
     absl::Duration pause = kFirstPause;
     PostgresError error;
     while (true) {
       const bool is_new = connection == nullptr;
-      if (is_new) error = PostgresConnection::Open(url_, description_, &connection);
+      if (is_new) {
+        error = PostgresConnection::Open(url_, description_, &connection);
+        // A server that is starting may refuse one moment and answer the next. Only one that never let anybody in, and
+        // refuses twice, means it.
+        const bool refused = connection == nullptr && error.fault == PostgresFault::kFinal;
+        if (refused && (connected_ || ++refusals < 2)) {
+          error = {PostgresFault::kBroken, absl::UnavailableError(error.status.message())};
+        }
+      }
       if (connection != nullptr) {
+        connected_ = true;
         error = action(*connection, deadline);
         if (error.status.ok()) break;
       }
@@ -135,6 +146,7 @@ class PostgresDatabase : public SqlDatabase {
   const PostgresOptions options_;
   std::map<std::string, PostgresStatement> statements_;
 
+  std::atomic<bool> connected_{false};  // some time, with these credentials
   std::mutex mutex_;
   std::condition_variable freed_;
   std::vector<std::unique_ptr<PostgresConnection>> idle_;
