@@ -16,8 +16,10 @@
 #include "common/base/check.h"
 #include "common/base/digest.h"
 #include "common/base/files.h"
+#include "common/blob/s3_testing.h"
 #include "common/scene/import.h"
 #include "common/synthetic/synthetic_scene.h"
+#include "coordinator/store/postgres_testing.h"
 
 namespace meshwright {
 namespace {
@@ -48,10 +50,13 @@ const testing::Environment* const kRemoveSharedScene = testing::AddGlobalTestEnv
 class ClusterTest : public testing::Test {
  protected:
   void SetUp() override {
+    MakeFolder();
+    StartCoordinator();
+  }
+  void MakeFolder() {
     std::string pattern = testing::TempDir() + "cluster_XXXXXX";
     MW_CHECK(mkdtemp(pattern.data()) != nullptr);
     folder_ = pattern;
-    StartCoordinator();
   }
   void TearDown() override {
     StopWorkers();
@@ -63,6 +68,8 @@ class ClusterTest : public testing::Test {
   void StartCoordinator() {
     auto started = CoordinatorProgram::Start({.listen = "127.0.0.1:0",
                                               .data_folder = folder_ + "/data",
+                                              .store = store_,
+                                              .blobs = blobs_,
                                               .scene_roots = {SharedScene()},
                                               .lease_seconds = 3});
     ASSERT_TRUE(started.ok()) << started.status();
@@ -72,11 +79,12 @@ class ClusterTest : public testing::Test {
   }
   void StartWorker(const std::string& id, bool shared_blobs) {
     auto worker = WorkerProgram::Make(
-        {.coordinator = address_, .id = id, .blobs = shared_blobs ? folder_ + "/data/blobs" : "", .cores = 1});
+        {.coordinator = address_, .id = id, .blobs = shared_blobs ? SharedBlobs() : "", .cores = 1});
     ASSERT_TRUE(worker.ok()) << worker.status();
     workers_.push_back(*std::move(worker));
     threads_.emplace_back([program = workers_.back().get()] { program->Run(); });
   }
+  std::string SharedBlobs() const { return blobs_.empty() ? folder_ + "/data/blobs" : blobs_; }
   void StopWorkers() {
     for (const auto& worker : workers_) worker->Drain();
     for (std::thread& thread : threads_) thread.join();
@@ -127,6 +135,8 @@ class ClusterTest : public testing::Test {
   }
 
   std::string folder_;
+  std::string store_;  // "": the default
+  std::string blobs_;
   std::string address_;
   std::unique_ptr<CoordinatorProgram> coordinator_;
   std::unique_ptr<ServiceClient> client_;
@@ -181,6 +191,43 @@ TEST_F(ClusterTest, ACoordinatorThatIsStartedAnewGoesOn) {
   const v1::Reconstruction done = WaitFor("facade");
   EXPECT_EQ(done.state(), v1::RECONSTRUCTION_STATE_DONE) << done.failure();
   EXPECT_TRUE(FetchMesh("facade") == LocalMesh());
+}
+
+TEST_F(ClusterTest, PostgresHoldsTheStateAsWell) {
+  const absl::StatusOr<std::string> server = SharedTestPostgres();
+  if (!server.ok()) GTEST_SKIP() << server.status().message();
+  const PostgresSchema schema(*server);
+  store_ = schema.url();
+  coordinator_.reset();
+  StartCoordinator();
+  StartWorker("w", true);
+  CreateAndStart(ByReference("facade"));
+  const v1::Reconstruction done = WaitFor("facade");
+  EXPECT_EQ(done.state(), v1::RECONSTRUCTION_STATE_DONE) << done.failure();
+  EXPECT_TRUE(FetchMesh("facade") == LocalMesh());
+  StopWorkers();
+  coordinator_.reset();  // before its schema goes
+}
+
+TEST_F(ClusterTest, S3HoldsTheBlobsAsWell) {
+  const auto server = S3Server::Start();
+  if (!server.ok()) GTEST_SKIP() << server.status().message();
+  const S3Options options = (*server)->NewOptions();
+  ::setenv("AWS_ENDPOINT_URL", options.endpoint.c_str(), 1);
+  ::setenv("AWS_REGION", options.region.c_str(), 1);
+  ::setenv("AWS_ACCESS_KEY_ID", options.access_key_id.c_str(), 1);
+  ::setenv("AWS_SECRET_ACCESS_KEY", options.secret_access_key.c_str(), 1);
+  blobs_ = absl::StrCat("s3://", options.bucket, "/", options.prefix);
+  coordinator_.reset();
+  StartCoordinator();
+  StartWorker("direct", true);
+  StartWorker("streaming", false);
+  CreateAndStart(ByReference("facade"));
+  const v1::Reconstruction done = WaitFor("facade");
+  EXPECT_EQ(done.state(), v1::RECONSTRUCTION_STATE_DONE) << done.failure();
+  EXPECT_TRUE(FetchMesh("facade") == LocalMesh());
+  StopWorkers();
+  coordinator_.reset();  // before its server goes
 }
 
 TEST_F(ClusterTest, CreatingIsIdempotentAndIdsAreNotUsedTwice) {

@@ -7,35 +7,26 @@
 #include <thread>
 #include <utility>
 
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
+#include "cli/service/open_stores.h"
 #include "cli/service/parse_method.h"
 #include "common/base/clock.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
-#include "common/blob/filesystem_blob_store.h"
+#include "common/blob/blob_store.h"
 #include "coordinator/api/reconstruction_logic.h"
 #include "coordinator/api/worker_logic.h"
 #include "coordinator/grpc/grpc_server.h"
-#include "coordinator/store/sqlite_job_store.h"
+#include "coordinator/store/job_store.h"
 
 namespace meshwright {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kSqliteScheme[] = "sqlite:";
 // Several times in the time of a lease, and not too often.
 constexpr int kLooksPerLease = 5;
-
-absl::StatusOr<std::unique_ptr<JobStore>> OpenStore(const CoordinatorSettings& settings) {
-  if (settings.store.empty()) return OpenSqliteJobStore(absl::StrCat(settings.data_folder, "/state.sqlite"));
-  if (absl::StartsWith(settings.store, kSqliteScheme)) {
-    return OpenSqliteJobStore(settings.store.substr(sizeof(kSqliteScheme) - 1));
-  }
-  return absl::InvalidArgumentError(absl::StrCat("--store is \"", settings.store, "\", expected sqlite:PATH"));
-}
 
 class RealCoordinatorProgram final : public CoordinatorProgram {
  public:
@@ -65,10 +56,11 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
       return absl::PermissionDeniedError(
           absl::StrCat(settings_.data_folder, ": cannot make the folder: ", error.message()));
     }
-    MW_ASSIGN_OR_RETURN(store_, OpenStore(settings_));
-    MW_ASSIGN_OR_RETURN(
-        blobs_, FilesystemBlobStore::Open(settings_.blobs.empty() ? absl::StrCat(settings_.data_folder, "/blobs")
-                                                                  : settings_.blobs));
+    const std::string& data = settings_.data_folder;
+    MW_ASSIGN_OR_RETURN(store_, OpenJobStore(settings_.store.empty() ? absl::StrCat("sqlite:", data, "/state.sqlite")
+                                                                     : settings_.store));
+    MW_ASSIGN_OR_RETURN(blobs_,
+                        OpenBlobStore(settings_.blobs.empty() ? absl::StrCat(data, "/blobs") : settings_.blobs));
     const ConductingEnvironment environment = {.store = store_.get(),
                                                .blobs = blobs_.get(),
                                                .clock = &clock_,

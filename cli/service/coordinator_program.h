@@ -12,8 +12,8 @@ namespace meshwright {
 struct CoordinatorSettings {
   std::string listen = "127.0.0.1:7420";  // host:port; port 0 takes a free one
   std::string data_folder;                // state, uploads, meshes
-  std::string store;                      // "sqlite:PATH"; "": sqlite in the data folder
-  std::string blobs;                      // a folder; "": in the data folder
+  std::string store;                      // as for OpenJobStore; "": sqlite in the data folder
+  std::string blobs;                      // as for OpenBlobStore; "": in the data folder
   std::vector<std::string> scene_roots;   // folders that scenes may be taken from by reference
   int threads = 1;                        // for acceptance and joining
   double lease_seconds = 30;

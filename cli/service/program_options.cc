@@ -43,10 +43,13 @@ void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings) {
                                     "authentication yet: only listen where everybody is trusted")
                         ->capture_default_str());
   NameInEnvironment(program.add_option("--data", settings.data_folder, "folder for state, uploads and meshes"));
-  NameInEnvironment(program.add_option("--store", settings.store, "sqlite:PATH [sqlite in the data folder]"));
-  NameInEnvironment(program.add_option("--blobs", settings.blobs,
-                                       "folder of surfaces and photographs [in the data "
-                                       "folder]"));
+  NameInEnvironment(program.add_option(
+      "--store", settings.store, "sqlite:PATH or postgresql://USER@HOST:PORT/DATABASE [sqlite in the data folder]"));
+  NameInEnvironment(
+      program.add_option("--blobs", settings.blobs,
+                         "folder or s3://BUCKET/PREFIX for surfaces and photographs; S3 takes AWS_ACCESS_KEY_ID, "
+                         "AWS_SECRET_ACCESS_KEY, AWS_REGION and AWS_ENDPOINT_URL [in the data "
+                         "folder]"));
   NameInEnvironment(program
                         .add_option("--scene-root", settings.scene_roots,
                                     "folders that scenes may be taken from by reference, with \":\" between them")
@@ -69,7 +72,8 @@ void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {
   NameInEnvironment(program.add_option("--coordinator", settings.coordinator, "its host:port")->capture_default_str());
   NameInEnvironment(program.add_option("--worker-id", settings.id, "unique [host name and process]"));
   NameInEnvironment(program.add_option(
-      "--blobs", settings.blobs, "the coordinator's folder of blobs where it is shared [through the coordinator]"));
+      "--blobs", settings.blobs,
+      "the coordinator's folder of blobs where it is shared, or s3://BUCKET/PREFIX [through the coordinator]"));
   NameInEnvironment(program.add_option("--cores", settings.cores, "jobs at the same time, and cores for all of them")
                         ->check(CLI::Range(1, 1024))
                         ->capture_default_str());

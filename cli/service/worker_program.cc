@@ -8,9 +8,9 @@
 #include <absl/time/clock.h>
 #include <unistd.h>
 
+#include "cli/service/open_stores.h"
 #include "cli/service/parse_method.h"
 #include "common/base/status_macros.h"
-#include "common/blob/filesystem_blob_store.h"
 #include "worker/agent/agent.h"
 #include "worker/agent/grpc_coordinator.h"
 
@@ -65,7 +65,7 @@ class RealWorkerProgram final : public WorkerProgram {
 absl::StatusOr<std::unique_ptr<WorkerProgram>> WorkerProgram::Make(const WorkerSettings& settings) {
   std::unique_ptr<BlobStore> shared_blobs;
   if (!settings.blobs.empty()) {
-    MW_ASSIGN_OR_RETURN(shared_blobs, FilesystemBlobStore::Open(settings.blobs));
+    MW_ASSIGN_OR_RETURN(shared_blobs, OpenBlobStore(settings.blobs));
   }
   return std::make_unique<RealWorkerProgram>(settings, GrpcCoordinator::Connect(settings.coordinator),
                                              std::move(shared_blobs));

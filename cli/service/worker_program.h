@@ -10,7 +10,7 @@ namespace meshwright {
 struct WorkerSettings {
   std::string coordinator = "127.0.0.1:7420";  // host:port
   std::string id;                              // "": host name and process
-  std::string blobs;                           // a folder shared with the coordinator; "": through the coordinator
+  std::string blobs;                           // the coordinator's, as for OpenBlobStore; "": through the coordinator
   int cores = 1;
   int64_t memory_mib = 0;  // 0: 512 for each core, at least 1024
   double drain_seconds = 30;

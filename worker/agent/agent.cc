@@ -22,6 +22,8 @@ constexpr double kDrainingPatienceSeconds = 0.5;
 constexpr std::chrono::milliseconds kFirstRetry(200);
 constexpr std::chrono::milliseconds kLastRetry(5000);
 constexpr int64_t kCacheShare = 8;
+constexpr absl::Duration kFirstRest = absl::Seconds(2);
+constexpr absl::Duration kLastRest = absl::Minutes(2);
 
 std::string DrawInstance() {
   std::random_device random;
@@ -109,8 +111,8 @@ v1::SynchronizeRequest Agent::NextRequest() {
     *request.add_held() = held.told;
   }
   request.set_cores(std::max(1, options_.cores - lost_cores));
-  request.set_draining(draining_ || lost_cores >= options_.cores);
-  request.set_patience_seconds(draining_ ? kDrainingPatienceSeconds : kPatienceSeconds);
+  request.set_draining(draining_ || now < resting_until_ || lost_cores >= options_.cores);
+  request.set_patience_seconds(request.draining() ? kDrainingPatienceSeconds : kPatienceSeconds);
   return request;
 }
 
@@ -157,6 +159,10 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
                          : absl::StrFormat("finished %s seconds=%.2f", NameOf(job.key()), seconds));
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (told.has_finished()) troubles_ = 0;
+    if (told.has_failed() && told.failed().infrastructure()) {
+      resting_until_ = absl::Now() + std::min(kLastRest, kFirstRest * (int64_t{1} << std::min(troubles_++, 20)));
+    }
     Held& held = held_.at(key);
     held.told = std::move(told);
     held.running = false;

@@ -80,6 +80,9 @@ class Agent {
   std::map<Key, Held> held_;
   bool draining_ = false;
   absl::Time drain_until_ = absl::InfiniteFuture();
+  // A worker that cannot reach the blobs leaves the jobs to others for a while.
+  int troubles_ = 0;  // since the last job that finished
+  absl::Time resting_until_ = absl::InfinitePast();
 };
 
 }  // namespace meshwright
