@@ -1,5 +1,5 @@
 // An S3 server for tests: s3rver with one bucket and the keys S3RVER, S3RVER, over the folder named as argument. Prints
-// its address, and ends when its standard input does: with the process that started it.
+// its address, and ends, and removes the folder, when its standard input does: with the process that started it.
 'use strict';
 
 const crypto = require('crypto');
@@ -66,4 +66,9 @@ server.middleware.unshift(async (context, next) => {
   context.body = '<Error><Code>SignatureDoesNotMatch</Code><Message>The signature does not match</Message></Error>';
 });
 server.run().then(({ port }) => console.log(`http://127.0.0.1:${port}`));
-process.stdin.on('end', () => process.exit(0)).resume();
+process.stdin
+  .on('end', () => {
+    fs.rmSync(process.argv[2], { recursive: true, force: true });
+    process.exit(0);
+  })
+  .resume();
