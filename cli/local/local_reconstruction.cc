@@ -30,8 +30,16 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// Of the memory limit, what decoded photographs may take that no job uses at the moment.
-constexpr int64_t kCacheShare = 4;
+// What decoded photographs may take that no job uses at the moment: twice what the running jobs hold, whatever the
+// number of cameras, and at most a quarter of the memory limit.
+int64_t ViewCacheBytes(const std::vector<Camera>& cameras, const ReconstructionOptions& options,
+                       const LocalSettings& settings) {
+  int64_t largest = 0;
+  for (const Camera& camera : cameras) largest = std::max(largest, SamplingImageBytes(camera.width, camera.height));
+  const int64_t views_in_use =
+      int64_t{ConcurrentJobs(options, settings.threads)} * (options.conductor.targets.max_targets + 1);
+  return std::min(settings.memory_limit_bytes / 4, 2 * views_in_use * largest);
+}
 
 // Whether files can be made beside `path`: better known before hours of work than after.
 absl::Status CheckWritable(const std::string& path) {
@@ -156,7 +164,7 @@ class LocalReconstruction {
         [&](CameraIndex camera) {
           return LoadView(scene_.views[static_cast<size_t>(camera)], options_.max_image_size);
         },
-        settings_.memory_limit_bytes / kCacheShare);
+        ViewCacheBytes(cameras_, options_, settings_));
     const CameraJobInputMaker inputs(scene_, cameras_, views, work_->blobs(), options_.job.lattice_step);
     JobRunner runner(scene_, inputs, options_.job, job_, *conductor_, work_->blobs(), pool_,
                      {.concurrent_jobs = ConcurrentJobs(options_, settings_.threads),

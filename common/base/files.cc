@@ -1,9 +1,5 @@
 #include "common/base/files.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
@@ -12,6 +8,9 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "common/base/status_macros.h"
 
@@ -149,8 +148,7 @@ absl::Status WriteFileAtomically(const std::string& path, absl::Span<const uint8
 }
 
 absl::Status WriteFileAtomically(const std::string& path, const std::string& bytes) {
-  return WriteFileAtomically(path,
-                             absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()));
+  return WriteFileAtomically(path, absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()));
 }
 
 }  // namespace meshwright

@@ -8,9 +8,11 @@
 #define MW_STATUS_CONCAT_INNER(a, b) a##b
 #define MW_STATUS_CONCAT(a, b) MW_STATUS_CONCAT_INNER(a, b)
 
+// NOLINTBEGIN(bugprone-macro-parentheses): declarations and statements cannot be put in parentheses.
+
 // Returns from the enclosing function when `expression` (an absl::Status) is not OK.
-#define MW_RETURN_IF_ERROR(expression)                     \
-  do {                                                     \
+#define MW_RETURN_IF_ERROR(expression)                                            \
+  do {                                                                            \
     if (absl::Status mw_status = (expression); !mw_status.ok()) return mw_status; \
   } while (false)
 
@@ -21,3 +23,5 @@
   auto name = (expression);                                      \
   if (!name.ok()) return std::move(name).status();               \
   declaration = std::move(name).value()
+
+// NOLINTEND(bugprone-macro-parentheses)

@@ -21,13 +21,13 @@ struct Lens {
     kThinPrismFisheye  // k1 k2 p1 p2 k3 k4 sx1 sy1        (THIN_PRISM_FISHEYE)
   };
 
-  int width = 0;   // px
-  int height = 0;  // px
-  double fx = 0;   // px
-  double fy = 0;   // px
-  double cx = 0;   // px
-  double cy = 0;   // px
-  double skew = 0; // px; K(0, 1)
+  int width = 0;    // px
+  int height = 0;   // px
+  double fx = 0;    // px
+  double fy = 0;    // px
+  double cx = 0;    // px
+  double cy = 0;    // px
+  double skew = 0;  // px; K(0, 1)
   Model model = Model::kPinhole;
   std::array<double, 8> coefficients = {};  // in the order named at the model
 
