@@ -7,9 +7,9 @@
 #include <absl/strings/str_format.h>
 
 #include "common/base/bad_input.h"
-#include "worker/job_input/view_cache.h"
 #include "common/base/status_macros.h"
 #include "common/scene/view.h"
+#include "worker/job_input/view_cache.h"
 
 namespace meshwright {
 namespace {

@@ -301,7 +301,7 @@ TEST(ParsePly, NoiseNeverCrashes) {
 }
 
 TEST(ReadPly, RealGroundTruth) {
-  const char* root = std::getenv("MESHWRIGHT_DATA");
+  const char* root = std::getenv("MESHWRIGHT_TEST_DATA");
   const std::string path =
       std::string(root != nullptr ? root : "../shared/data") + "/herzjesu-rendered/ground_truth.ply";
   if (!fs::exists(path)) GTEST_SKIP() << path << " is absent";

@@ -16,7 +16,7 @@ namespace {
 
 // Folder of the real scenes; tests run in the root of the repository.
 std::string DataFolder() {
-  const char* folder = std::getenv("MESHWRIGHT_DATA");
+  const char* folder = std::getenv("MESHWRIGHT_TEST_DATA");
   return folder != nullptr ? folder : "../shared/data";
 }
 

@@ -19,7 +19,7 @@ namespace meshwright {
 namespace {
 
 std::filesystem::path DataFolder() {
-  const char* folder = std::getenv("MESHWRIGHT_DATA");
+  const char* folder = std::getenv("MESHWRIGHT_TEST_DATA");
   return folder != nullptr ? folder : "../shared/data";
 }
 

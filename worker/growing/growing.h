@@ -15,7 +15,7 @@ namespace meshwright {
 
 // Section 3.6 of Jancosek et al. 2009.
 struct GrowingOptions {
-  double min_quality = 0.4;         // condition (2): q of a grown patch, -1..1 (the paper: 0.6 with unweighted NCC)
+  double min_quality = 0.4;          // condition (2): q of a grown patch, -1..1 (the paper: 0.6 with unweighted NCC)
   double max_quality_deficit = 0.1;  // condition (2): q may be this much below the best on its ray, 0..2
   int max_patches_per_ray = 10;      // condition (5), 1..32
   double normal_radius_steps = 10;   // normals from patches of the same seed this near, lattice steps, 1..16
