@@ -63,8 +63,11 @@ class PatchScorer {
 
   // The reference window around integer pixel (x, y), made once and compared many times.
   struct Window {
-    float weights[232];   // sum to 1
-    float values[232];    // (grey - mean) / (samples * sigma); padded with zeros to whole groups
+    // MakeWindow fills the arrays; clearing them before would cost as much again.
+    Window() {}  // NOLINT(cppcoreguidelines-pro-type-member-init,modernize-use-equals-default)
+
+    float weights[232];   // sum to 1; padded with zeros to whole groups
+    float values[232];    // weight * (grey - mean) / weighted standard deviation; padded likewise
     float sigma = 0;      // grey levels
     bool usable = false;  // inside the image and textured
   };
