@@ -1,0 +1,43 @@
+#include "common/telemetry/measured_blob_store.h"
+
+#include <absl/time/clock.h>
+
+namespace meshwright {
+
+MeasuredBlobStore::MeasuredBlobStore(BlobStore& blobs, Metrics& metrics)
+    : blobs_(blobs),
+      calls_(metrics, "meshwright_blob", "Calls to the blob store"),
+      read_bytes_(metrics.Counter("meshwright_blob_read_bytes_total", "Bytes got from the blob store.")),
+      written_bytes_(metrics.Counter("meshwright_blob_written_bytes_total", "Bytes put into the blob store.")) {}
+
+absl::StatusOr<std::string> MeasuredBlobStore::Put(const std::string& bytes) {
+  const absl::Time begun = absl::Now();
+  absl::StatusOr<std::string> digest = blobs_.Put(bytes);
+  calls_.Record("put", absl::Now() - begun, digest.status());
+  if (digest.ok()) written_bytes_.Increment(static_cast<double>(bytes.size()));
+  return digest;
+}
+
+absl::StatusOr<std::string> MeasuredBlobStore::Get(const std::string& digest) {
+  const absl::Time begun = absl::Now();
+  absl::StatusOr<std::string> bytes = blobs_.Get(digest);
+  calls_.Record("get", absl::Now() - begun, bytes.status());
+  if (bytes.ok()) read_bytes_.Increment(static_cast<double>(bytes->size()));
+  return bytes;
+}
+
+absl::StatusOr<bool> MeasuredBlobStore::Has(const std::string& digest) {
+  const absl::Time begun = absl::Now();
+  const absl::StatusOr<bool> has = blobs_.Has(digest);
+  calls_.Record("has", absl::Now() - begun, has.status());
+  return has;
+}
+
+absl::Status MeasuredBlobStore::Delete(const std::string& digest) {
+  const absl::Time begun = absl::Now();
+  absl::Status status = blobs_.Delete(digest);
+  calls_.Record("delete", absl::Now() - begun, status);
+  return status;
+}
+
+}  // namespace meshwright
