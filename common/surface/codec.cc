@@ -38,17 +38,12 @@ struct Run {
   uint32_t length = 0;
 };
 
-std::vector<Run> FindRuns(const PatchLattice& surface) {
+std::vector<Run> FindRuns(const SparseSurface& surface) {
   std::vector<Run> runs;
-  const auto nodes = static_cast<uint32_t>(surface.lattice.nodes());
-  for (uint32_t node = 0; node < nodes;) {
-    if (!surface.HasPatch(node)) {
-      ++node;
-      continue;
-    }
-    const uint32_t first = node;
-    while (node < nodes && surface.HasPatch(node)) ++node;
-    runs.push_back({first, node - first});
+  for (const int32_t node : surface.node) {
+    const auto at = static_cast<uint32_t>(node);
+    if (runs.empty() || runs.back().first + runs.back().length != at) runs.push_back({at, 0});
+    ++runs.back().length;
   }
   return runs;
 }
@@ -79,35 +74,25 @@ Camera CameraFrom(int32_t width, int32_t height, const std::array<double, 16>& n
   return camera;
 }
 
-// `per_node` scalars T of each node, of which the format keeps those of nodes with a patch, run after run.
 template <typename T>
-char* StoreColumn(const T* values, size_t per_node, const std::vector<Run>& runs, char* out) {
-  for (const Run& run : runs) {
-    const T* first = values + run.first * per_node;
-    const size_t count = run.length * per_node;
-    if constexpr (std::endian::native == std::endian::little || sizeof(T) == 1) {
-      std::memcpy(out, first, count * sizeof(T));
-      out += count * sizeof(T);
-    } else {
-      for (size_t i = 0; i < count; ++i) out = StoreLittleEndian(first[i], out);
-    }
+char* StoreColumn(const T* values, size_t count, char* out) {
+  if constexpr (std::endian::native == std::endian::little || sizeof(T) == 1) {
+    std::memcpy(out, values, count * sizeof(T));
+    out += count * sizeof(T);
+  } else {
+    for (size_t i = 0; i < count; ++i) out = StoreLittleEndian(values[i], out);
   }
   return out;
 }
 
 template <typename T>
-const char* LoadColumn(const char* bytes, size_t per_node, const std::vector<Run>& runs, T* values) {
-  for (const Run& run : runs) {
-    T* first = values + run.first * per_node;
-    const size_t count = run.length * per_node;
-    if constexpr (std::endian::native == std::endian::little || sizeof(T) == 1) {
-      std::memcpy(first, bytes, count * sizeof(T));
-    } else {
-      for (size_t i = 0; i < count; ++i) first[i] = LoadLittleEndian<T>(bytes + i * sizeof(T));
-    }
-    bytes += count * sizeof(T);
+const char* LoadColumn(const char* bytes, size_t count, T* values) {
+  if constexpr (std::endian::native == std::endian::little || sizeof(T) == 1) {
+    std::memcpy(values, bytes, count * sizeof(T));
+  } else {
+    for (size_t i = 0; i < count; ++i) values[i] = LoadLittleEndian<T>(bytes + i * sizeof(T));
   }
-  return bytes;
+  return bytes + count * sizeof(T);
 }
 
 // Reads fields one behind the other; the caller has made sure that the bytes exist.
@@ -155,42 +140,50 @@ absl::Status CheckFrame(const std::string& bytes) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::vector<Run>> LoadRuns(Fields& fields, uint64_t count, uint64_t patches, int64_t nodes) {
-  std::vector<Run> runs(count);
-  uint64_t total = 0;
+// The nodes of all runs, ascending.
+absl::StatusOr<std::vector<int32_t>> LoadRuns(Fields& fields, uint64_t count, uint64_t patches, int64_t nodes) {
+  std::vector<int32_t> node_of_patch;
+  node_of_patch.reserve(patches);
   uint64_t next = 0;  // first node at which the next run may begin
   for (uint64_t i = 0; i < count; ++i) {
-    runs[i].first = fields.Next<uint32_t>();
-    runs[i].length = fields.Next<uint32_t>();
-    const uint64_t end = uint64_t{runs[i].first} + runs[i].length;
-    if (runs[i].first < next || runs[i].length == 0 || end > static_cast<uint64_t>(nodes)) {
-      return Bad(absl::StrCat("run ", i), absl::StrCat(runs[i].first, " + ", runs[i].length),
+    const auto first = fields.Next<uint32_t>();
+    const auto length = fields.Next<uint32_t>();
+    const uint64_t end = uint64_t{first} + length;
+    if (first < next || length == 0 || end > static_cast<uint64_t>(nodes)) {
+      return Bad(absl::StrCat("run ", i), absl::StrCat(first, " + ", length),
                  absl::StrCat("nodes in ", next, "..", nodes - 1));
     }
     next = end + 1;
-    total += runs[i].length;
+    if (node_of_patch.size() + length > patches) {
+      return Bad("sum of the runs' lengths", node_of_patch.size() + length,
+                 absl::StrCat("the number of patches, ", patches));
+    }
+    for (uint64_t node = first; node < end; ++node) node_of_patch.push_back(static_cast<int32_t>(node));
   }
-  if (total != patches) return Bad("sum of the runs' lengths", total, absl::StrCat("the number of patches, ", patches));
-  return runs;
+  if (node_of_patch.size() != patches) {
+    return Bad("sum of the runs' lengths", node_of_patch.size(), absl::StrCat("the number of patches, ", patches));
+  }
+  return node_of_patch;
 }
 
 // What the rest of the system relies on: depths that are depths, links between nodes that have a patch.
-absl::Status CheckPatches(const PatchLattice& surface, const std::vector<Run>& runs) {
-  const auto columns = static_cast<uint32_t>(surface.lattice.columns);
-  const auto nodes = static_cast<uint64_t>(surface.lattice.nodes());
-  for (const Run& run : runs) {
-    for (uint32_t node = run.first; node < run.first + run.length; ++node) {
-      if (!(surface.depth[node] > 0) || std::isinf(surface.depth[node])) {
-        return Bad(absl::StrCat("depth of node ", node), surface.depth[node], "a finite number above 0");
-      }
-      const uint8_t links = surface.links[node];
-      const bool right = (links & PatchLattice::kLinkRight) != 0;
-      const bool down = (links & PatchLattice::kLinkDown) != 0;
-      if ((links & ~(PatchLattice::kLinkRight | PatchLattice::kLinkDown)) != 0 ||
-          (right && ((node + 1) % columns == 0 || !surface.HasPatch(node + 1))) ||
-          (down && (uint64_t{node} + columns >= nodes || !surface.HasPatch(node + columns)))) {
-        return Bad(absl::StrCat("links of node ", node), static_cast<int>(links), "links to nodes with a patch");
-      }
+absl::Status CheckPatches(const SparseSurface& surface) {
+  const int32_t columns = surface.lattice.columns;
+  const size_t patches = surface.patches();
+  size_t below = 0;  // the first patch at the node below or behind it
+  for (size_t patch = 0; patch < patches; ++patch) {
+    const int32_t node = surface.node[patch];
+    if (!(surface.depth[patch] > 0) || std::isinf(surface.depth[patch])) {
+      return Bad(absl::StrCat("depth of node ", node), surface.depth[patch], "a finite number above 0");
+    }
+    while (below < patches && surface.node[below] < node + columns) ++below;
+    const uint8_t links = surface.links[patch];
+    const bool has_right = (node + 1) % columns != 0 && patch + 1 < patches && surface.node[patch + 1] == node + 1;
+    const bool has_below = below < patches && surface.node[below] == node + columns;
+    if ((links & ~(PatchLattice::kLinkRight | PatchLattice::kLinkDown)) != 0 ||
+        ((links & PatchLattice::kLinkRight) != 0 && !has_right) ||
+        ((links & PatchLattice::kLinkDown) != 0 && !has_below)) {
+      return Bad(absl::StrCat("links of node ", node), static_cast<int>(links), "links to nodes with a patch");
     }
   }
   return absl::OkStatus();
@@ -198,14 +191,15 @@ absl::Status CheckPatches(const PatchLattice& surface, const std::vector<Run>& r
 
 }  // namespace
 
-std::string EncodeSurface(const PatchLattice& surface) {
+std::string EncodeSurface(const PatchLattice& surface) { return EncodeSurface(SparseSurface::From(surface)); }
+
+std::string EncodeSurface(const SparseSurface& surface) {
   const Lattice& lattice = surface.lattice;
   const Lattice expected = Lattice::For(surface.camera, lattice.step);
   MW_CHECK(lattice.columns == expected.columns && lattice.rows == expected.rows && lattice.nodes() <= kMostNodes);
   const std::vector<Run> runs = FindRuns(surface);
-  MW_CHECK(CheckPatches(surface, runs).ok());  // a surface that could be written but not read would be noticed too late
-  uint64_t patches = 0;
-  for (const Run& run : runs) patches += run.length;
+  MW_CHECK(CheckPatches(surface).ok());  // a surface that could be written but not read would be noticed too late
+  const size_t patches = surface.patches();
 
   std::string bytes(kHeaderBytes + runs.size() * kRunBytes + patches * kPatchBytes + kChecksumBytes, '\0');
   char* out = std::copy(std::begin(kMagic), std::end(kMagic), bytes.data());
@@ -216,7 +210,7 @@ std::string EncodeSurface(const PatchLattice& surface) {
     out = StoreLittleEndian(number, out);
   }
   out = StoreLittleEndian(uint64_t{runs.size()}, out);
-  out = StoreLittleEndian(patches, out);
+  out = StoreLittleEndian(uint64_t{patches}, out);
   for (const double number : CameraNumbers(surface.camera)) out = StoreLittleEndian(number, out);
   out = StoreLittleEndian(uint64_t{0}, out);  // reserved
   MW_CHECK(out == bytes.data() + kHeaderBytes);
@@ -225,17 +219,22 @@ std::string EncodeSurface(const PatchLattice& surface) {
     out = StoreLittleEndian(run.length, out);
   }
   if (patches > 0) {
-    out = StoreColumn(surface.depth.data(), 1, runs, out);
-    out = StoreColumn(surface.normal_in_world.front().data(), 3, runs, out);
-    out = StoreColumn(surface.quality.data(), 1, runs, out);
-    out = StoreColumn(surface.rgb.front().data(), 3, runs, out);
-    out = StoreColumn(surface.links.data(), 1, runs, out);
+    out = StoreColumn(surface.depth.data(), patches, out);
+    out = StoreColumn(surface.normal_in_world.front().data(), 3 * patches, out);
+    out = StoreColumn(surface.quality.data(), patches, out);
+    out = StoreColumn(surface.rgb.front().data(), 3 * patches, out);
+    out = StoreColumn(surface.links.data(), patches, out);
   }
   StoreLittleEndian(Checksum(bytes.data(), bytes.size() - kChecksumBytes), out);
   return bytes;
 }
 
 absl::StatusOr<PatchLattice> DecodeSurface(const std::string& bytes) {
+  MW_ASSIGN_OR_RETURN(const SparseSurface surface, DecodeSparseSurface(bytes));
+  return surface.ToLattice();
+}
+
+absl::StatusOr<SparseSurface> DecodeSparseSurface(const std::string& bytes) {
   MW_RETURN_IF_ERROR(CheckFrame(bytes));
   Fields fields(bytes.data() + sizeof(kMagic) + sizeof(uint32_t) + sizeof(uint64_t));
   const auto camera_index = fields.Next<int32_t>();
@@ -267,18 +266,22 @@ absl::StatusOr<PatchLattice> DecodeSurface(const std::string& bytes) {
     return Bad("number of runs and patches", absl::StrCat(run_count, " and ", patches),
                absl::StrCat("as many as fill ", body, " bytes"));
   }
-  MW_ASSIGN_OR_RETURN(const std::vector<Run> runs, LoadRuns(fields, run_count, patches, lattice.nodes()));
-
-  PatchLattice surface = PatchLattice::Empty(camera_index, camera, step);
+  SparseSurface surface{.camera_index = camera_index, .camera = camera, .lattice = lattice};
+  MW_ASSIGN_OR_RETURN(surface.node, LoadRuns(fields, run_count, patches, lattice.nodes()));
+  surface.depth.resize(patches);
+  surface.normal_in_world.resize(patches);
+  surface.quality.resize(patches);
+  surface.rgb.resize(patches);
+  surface.links.resize(patches);
   if (patches > 0) {
     const char* column = fields.next();
-    column = LoadColumn(column, 1, runs, surface.depth.data());
-    column = LoadColumn(column, 3, runs, surface.normal_in_world.front().data());
-    column = LoadColumn(column, 1, runs, surface.quality.data());
-    column = LoadColumn(column, 3, runs, surface.rgb.front().data());
-    LoadColumn(column, 1, runs, surface.links.data());
+    column = LoadColumn(column, patches, surface.depth.data());
+    column = LoadColumn(column, 3 * patches, surface.normal_in_world.front().data());
+    column = LoadColumn(column, patches, surface.quality.data());
+    column = LoadColumn(column, 3 * patches, surface.rgb.front().data());
+    LoadColumn(column, patches, surface.links.data());
   }
-  MW_RETURN_IF_ERROR(CheckPatches(surface, runs));
+  MW_RETURN_IF_ERROR(CheckPatches(surface));
   return surface;
 }
 
