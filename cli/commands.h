@@ -21,6 +21,7 @@ void AddEvaluateCommand(CLI::App& program, Run& run);
 void AddSynthesizeCommand(CLI::App& program, Run& run);
 void AddRenderCommand(CLI::App& program, Run& run);
 void AddSubmitCommand(CLI::App& program, Run& run);
+void AddOptionsCommand(CLI::App& program, Run& run);
 void AddUpCommand(CLI::App& program, Run& run);
 // status, watch, fetch, cancel, delete, workers.
 void AddServiceCommands(CLI::App& program, Run& run);

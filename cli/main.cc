@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
   AddEvaluateCommand(program, run);
   AddSynthesizeCommand(program, run);
   AddRenderCommand(program, run);
+  AddOptionsCommand(program, run);
   AddUpCommand(program, run);
   AddSubmitCommand(program, run);
   AddServiceCommands(program, run);

@@ -19,6 +19,15 @@ absl::Status ReconstructionOptions::Validate() const {
   return conductor.Validate();
 }
 
+std::vector<OptionDescription> DescribeOptions() {
+  std::vector<OptionDescription> descriptions;
+  const ReconstructionOptions defaults;
+  VisitOptions(defaults, [&](const char* group, const char* name, const auto& field, const char* help) {
+    descriptions.push_back({group, name, field, help});
+  });
+  return descriptions;
+}
+
 nlohmann::ordered_json ToJson(const ReconstructionOptions& options) {
   nlohmann::ordered_json json;
   json["version"] = MW_VERSION;

@@ -91,6 +91,15 @@ void VisitOptions(Options& options, Visitor&& visit) {
   visit(group, "blend", options.join.blend_steps, "colours run into each other this far from seams, lattice steps");
 }
 
+// One line of the table, for pages and for programs that offer the options to their users.
+struct OptionDescription {
+  std::string group;
+  std::string name;
+  nlohmann::ordered_json default_value;  // a whole or a real number; its type is the option's
+  std::string help;
+};
+std::vector<OptionDescription> DescribeOptions();
+
 // {"max-image-size": 0, ...} and the program's version: what a work folder must agree with.
 nlohmann::ordered_json ToJson(const ReconstructionOptions& options);
 
