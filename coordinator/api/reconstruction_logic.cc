@@ -297,17 +297,24 @@ absl::Status ReconstructionLogic::Delete(const std::string& id) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<v1::ListCamerasResponse> ReconstructionLogic::ListCameras(const std::string& id) const {
+absl::StatusOr<Scene> ReconstructionLogic::LoadScene(const std::string& id) const {
   std::string scene_blob;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     MW_ASSIGN_OR_RETURN(const Entry* const entry, Find(id));
+    if (entry->record.scene_blob.empty()) return WrongState(entry->record, "one whose scene has been checked");
     scene_blob = entry->record.scene_blob;
   }
-  v1::ListCamerasResponse response;
-  if (scene_blob.empty()) return response;
   MW_ASSIGN_OR_RETURN(const std::string bytes, environment_.blobs->Get(scene_blob));
-  MW_ASSIGN_OR_RETURN(const Scene scene, DecodeScene(bytes));
+  return DecodeScene(bytes);
+}
+
+absl::StatusOr<v1::ListCamerasResponse> ReconstructionLogic::ListCameras(const std::string& id) const {
+  v1::ListCamerasResponse response;
+  const absl::StatusOr<Scene> loaded = LoadScene(id);
+  if (absl::IsFailedPrecondition(loaded.status())) return response;
+  MW_RETURN_IF_ERROR(loaded.status());
+  const Scene& scene = *loaded;
   for (size_t i = 0; i < scene.views.size(); ++i) {
     v1::Camera& camera = *response.add_cameras();
     camera.set_index(static_cast<int32_t>(i));

@@ -40,6 +40,9 @@ class ReconstructionLogic {
   absl::StatusOr<v1::Reconstruction> Cancel(const std::string& id);
   absl::Status Delete(const std::string& id);
   absl::StatusOr<v1::ListCamerasResponse> ListCameras(const std::string& id) const;
+  // As it was taken: image_path of each view is the digest of its photograph's blob. FailedPrecondition before it was
+  // checked.
+  absl::StatusOr<Scene> LoadScene(const std::string& id) const;
   absl::StatusOr<v1::GetIncidenceResponse> GetIncidence(const std::string& id) const;
   absl::StatusOr<v1::ListPartsResponse> ListParts(const std::string& id) const;
   // The file to be read, there as long as the reconstruction is not deleted.
