@@ -1,5 +1,6 @@
 #include "worker/job_input/camera_job_input.h"
 
+#include <string>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -10,13 +11,24 @@
 #include "common/surface/codec.h"
 
 namespace meshwright {
+namespace {
+
+// Decoded surfaces kept between jobs.
+constexpr int64_t kSurfaceCacheBytes = int64_t{64} << 20;
+
+}  // namespace
 
 CameraJobInputMaker::CameraJobInputMaker(const Scene& scene, const std::vector<Camera>& cameras, ViewCache& views,
                                          BlobStore& blobs, int lattice_step)
     : scene_(scene),
       cameras_(cameras),
       views_(views),
-      blobs_(blobs),
+      surfaces_(
+          [&blobs](const std::string& digest) -> absl::StatusOr<SparseSurface> {
+            MW_ASSIGN_OR_RETURN(const std::string bytes, blobs.Get(digest));
+            return DecodeSparseSurface(bytes);
+          },
+          kSurfaceCacheBytes),
       lattice_step_(lattice_step),
       points_of_camera_(cameras.size()) {
   for (size_t i = 0; i < scene.points.size(); ++i) {
@@ -70,12 +82,17 @@ absl::Status CameraJobInputMaker::LoadViews(const CameraJobSpec& spec, CameraJob
 
 absl::Status CameraJobInputMaker::AddAcceptedSurfaces(const CameraJobSpec& spec, CameraJobInput& input,
                                                       ThreadPool& pool) const {
-  input.accepted = AcceptedDepth::Empty(input.reference.camera, lattice_step_);
-  for (const AcceptedSurface& accepted : spec.accepted) {
-    MW_ASSIGN_OR_RETURN(const std::string bytes, blobs_.Get(accepted.digest));
-    MW_ASSIGN_OR_RETURN(const PatchLattice surface, DecodeSurface(bytes));
-    AddAcceptedSurface(surface, input.reference.camera, input.accepted, pool);
-  }
+  AcceptedDepthBuffer visible(input.reference.camera, lattice_step_);
+  std::vector<absl::Status> statuses(spec.accepted.size());
+  pool.ParallelFor(static_cast<int64_t>(statuses.size()), 1, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      const auto surface = surfaces_.Get(spec.accepted[i].digest);
+      statuses[i] = surface.status();
+      if (surface.ok()) visible.Add(**surface, pool);
+    }
+  });
+  for (const absl::Status& status : statuses) MW_RETURN_IF_ERROR(status);
+  input.accepted = visible.Depth();
   return absl::OkStatus();
 }
 

@@ -10,6 +10,7 @@
 #include "common/geometry/camera.h"
 #include "common/job/camera_job_spec.h"
 #include "common/scene/scene.h"
+#include "common/surface/surface_cache.h"
 #include "worker/camera_job/camera_job.h"
 #include "worker/job_input/view_cache.h"
 
@@ -44,7 +45,7 @@ class CameraJobInputMaker {
   const Scene& scene_;
   const std::vector<Camera>& cameras_;
   ViewCache& views_;
-  BlobStore& blobs_;
+  mutable SurfaceCache surfaces_;  // the same surfaces are drawn for camera after camera
   const int lattice_step_;
   std::vector<std::vector<int32_t>> points_of_camera_;  // positions in scene.points
 };

@@ -6,10 +6,10 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include <Eigen/Core>
 
-#include "common/base/check.h"
 #include "common/surface/triangulation.h"
 
 namespace meshwright {
@@ -22,17 +22,17 @@ constexpr int64_t kSubSteps = int64_t{1} << kSubStepBits;
 // Corners further out than this (in steps) belong to triangles next to the camera's plane; the limit keeps the edge
 // functions within 64 bits.
 constexpr double kMaxCoordinate = 1 << 18;
+constexpr int64_t kPatchesAtOnce = 8192;
 
-// A node of the accepted surface as the reference camera sees it.
+// A patch of the accepted surface as the reference camera sees it.
 struct Vertex {
   int32_t u = 0;            // lattice column, 1 / kSubSteps
   int32_t v = 0;            // lattice row, 1 / kSubSteps
-  float inverse_depth = 0;  // 0: no patch, or not in front of the camera
+  float inverse_depth = 0;  // 0: not in front of the camera
   float quality = 0;
 };
 
-// (depth, quality) in one number that is smaller when the depth is smaller, or equal and the quality higher. The least
-// of a set of such numbers does not depend on the order in which threads bring them.
+// As AcceptedDepthBuffer says.
 using Key = uint64_t;
 constexpr Key kNothing = ~Key{0};
 
@@ -57,32 +57,40 @@ void KeepLess(Key& place, Key key) {
   }
 }
 
-std::vector<Vertex> ProjectNodes(const PatchLattice& accepted, const Camera& reference, const Lattice& lattice,
-                                 ThreadPool& pool) {
+std::vector<Vertex> ProjectPatches(const SparseSurface& accepted, const Camera& reference, const Lattice& lattice,
+                                   ThreadPool& pool) {
   const Rigid3 ref_from_cam = reference.cam_from_world * Inverse(accepted.camera.cam_from_world);
-  std::vector<Vertex> vertices(static_cast<size_t>(accepted.lattice.nodes()));
-  pool.ParallelFor(accepted.lattice.rows, 16, [&](int64_t begin, int64_t end) {
-    for (auto row = static_cast<int>(begin); row < end; ++row) {
-      for (int column = 0; column < accepted.lattice.columns; ++column) {
-        const auto node = static_cast<size_t>(accepted.lattice.Index(column, row));
-        const float depth = accepted.depth[node];
-        if (depth <= 0) continue;
-        const Eigen::Vector2d pixel = accepted.lattice.Pixel(column, row);
-        const Eigen::Vector3d x_in_ref =
-            ref_from_cam * Eigen::Vector3d(double{depth} * accepted.camera.RayInCam(pixel.x(), pixel.y()));
-        if (x_in_ref.z() <= 0) continue;
-        const Eigen::Vector2d place = lattice.FromPixel(reference.ProjectFromCam(x_in_ref));
-        // Written so that NaN fails it.
-        if (!(std::abs(place.x()) < kMaxCoordinate && std::abs(place.y()) < kMaxCoordinate)) continue;
-        const auto inverse_depth = static_cast<float>(1 / x_in_ref.z());
-        if (!std::isfinite(inverse_depth)) continue;
-        vertices[node] = {static_cast<int32_t>(std::floor(place.x() * kSubSteps + 0.5)),
-                          static_cast<int32_t>(std::floor(place.y() * kSubSteps + 0.5)), inverse_depth,
-                          accepted.quality[node]};
-      }
+  std::vector<Vertex> vertices(accepted.patches());
+  pool.ParallelFor(static_cast<int64_t>(vertices.size()), kPatchesAtOnce, [&](int64_t begin, int64_t end) {
+    for (auto patch = static_cast<size_t>(begin); patch < static_cast<size_t>(end); ++patch) {
+      const Eigen::Vector2d pixel = accepted.lattice.Pixel(accepted.Column(patch), accepted.Row(patch));
+      const Eigen::Vector3d x_in_ref = ref_from_cam * Eigen::Vector3d(double{accepted.depth[patch]} *
+                                                                      accepted.camera.RayInCam(pixel.x(), pixel.y()));
+      if (x_in_ref.z() <= 0) continue;
+      const Eigen::Vector2d place = lattice.FromPixel(reference.ProjectFromCam(x_in_ref));
+      // Written so that NaN fails it.
+      if (!(std::abs(place.x()) < kMaxCoordinate && std::abs(place.y()) < kMaxCoordinate)) continue;
+      const auto inverse_depth = static_cast<float>(1 / x_in_ref.z());
+      if (!std::isfinite(inverse_depth)) continue;
+      vertices[patch] = {static_cast<int32_t>(std::floor(place.x() * kSubSteps + 0.5)),
+                         static_cast<int32_t>(std::floor(place.y() * kSubSteps + 0.5)), inverse_depth,
+                         accepted.quality[patch]};
     }
   });
   return vertices;
+}
+
+// False only if no triangle of these vertices has a node of the lattice in it.
+bool MayShow(const std::vector<Vertex>& vertices, const Lattice& lattice) {
+  Vertex low = {std::numeric_limits<int32_t>::max(), std::numeric_limits<int32_t>::max()};
+  Vertex high = {std::numeric_limits<int32_t>::min(), std::numeric_limits<int32_t>::min()};
+  for (const Vertex& vertex : vertices) {
+    if (!(vertex.inverse_depth > 0)) continue;
+    low = {std::min(low.u, vertex.u), std::min(low.v, vertex.v)};
+    high = {std::max(high.u, vertex.u), std::max(high.v, vertex.v)};
+  }
+  return high.u >= 0 && high.v >= 0 && low.u <= (lattice.columns - 1) * kSubSteps &&
+         low.v <= (lattice.rows - 1) * kSubSteps;
 }
 
 // Lattice lines that a range of coordinates contains.
@@ -133,34 +141,36 @@ AcceptedDepth AcceptedDepth::Empty(const Camera& reference, int step) {
   return empty;
 }
 
-void AddAcceptedSurface(const PatchLattice& accepted, const Camera& reference, AcceptedDepth& visible,
-                        ThreadPool& pool) {
-  const auto nodes = static_cast<size_t>(visible.lattice.nodes());
-  MW_CHECK(visible.depth.size() == nodes && visible.quality.size() == nodes);
-  const std::vector<std::array<int32_t, 3>> triangles = TriangulateLattice(accepted);
-  if (triangles.empty() || nodes == 0) return;
-  const std::vector<Vertex> vertices = ProjectNodes(accepted, reference, visible.lattice, pool);
+AcceptedDepthBuffer::AcceptedDepthBuffer(const Camera& reference, int step)
+    : reference_(reference),
+      lattice_(Lattice::For(reference, step)),
+      keys_(static_cast<size_t>(lattice_.nodes()), kNothing) {}
 
-  std::vector<Key> keys(nodes);
-  for (size_t i = 0; i < nodes; ++i) {
-    keys[i] = visible.depth[i] > 0 ? MakeKey(visible.depth[i], visible.quality[i]) : kNothing;
-  }
-  pool.ParallelFor(static_cast<int64_t>(triangles.size()), 16384, [&](int64_t begin, int64_t end) {
+void AcceptedDepthBuffer::Add(const SparseSurface& accepted, ThreadPool& pool) {
+  const std::vector<Vertex> vertices = ProjectPatches(accepted, reference_, lattice_, pool);
+  if (!MayShow(vertices, lattice_)) return;
+  const std::vector<std::array<int32_t, 3>> triangles = Triangulate(accepted);
+  pool.ParallelFor(static_cast<int64_t>(triangles.size()), 2 * kPatchesAtOnce, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       const auto& corners = triangles[static_cast<size_t>(i)];
       const Vertex& a = vertices[static_cast<size_t>(corners[0])];
       const Vertex& b = vertices[static_cast<size_t>(corners[1])];
       const Vertex& c = vertices[static_cast<size_t>(corners[2])];
       if (a.inverse_depth > 0 && b.inverse_depth > 0 && c.inverse_depth > 0) {
-        DrawTriangle(a, b, c, visible.lattice, keys);
+        DrawTriangle(a, b, c, lattice_, keys_);
       }
     }
   });
-  for (size_t i = 0; i < nodes; ++i) {
-    if (keys[i] == kNothing) continue;
-    visible.depth[i] = DepthOf(keys[i]);
-    visible.quality[i] = QualityOf(keys[i]);
+}
+
+AcceptedDepth AcceptedDepthBuffer::Depth() const {
+  AcceptedDepth visible = AcceptedDepth::Empty(reference_, lattice_.step);
+  for (size_t i = 0; i < keys_.size(); ++i) {
+    if (keys_[i] == kNothing) continue;
+    visible.depth[i] = DepthOf(keys_[i]);
+    visible.quality[i] = QualityOf(keys_[i]);
   }
+  return visible;
 }
 
 }  // namespace meshwright

@@ -1,11 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "common/base/thread_pool.h"
 #include "common/geometry/camera.h"
 #include "common/surface/lattice.h"
-#include "common/surface/patch_lattice.h"
+#include "common/surface/sparse_surface.h"
 
 namespace meshwright {
 
@@ -19,14 +20,30 @@ struct AcceptedDepth {
   static AcceptedDepth Empty(const Camera& reference, int step);
 };
 
-// Adds one accepted surface M_i: its triangles are drawn into the reference camera's lattice, the closest kept (of two
-// at the same depth the one of higher quality). Surfaces may be added in any order, with any number of threads, with
-// the same result.
+// Draws accepted surfaces M_i into a reference camera's lattice: of all their triangles the closest on each ray is kept
+// (of two at the same depth the one of higher quality). Surfaces may be added in any order, by any number of threads at
+// the same time, with the same result.
 //
 // Left out: triangles that turn away from the reference camera (they hide nothing), triangles with a corner that is not
 // in front of it, and patches that belong to no triangle: these are not part of the mesh, so that a ray behind one must
 // still be processed.
-void AddAcceptedSurface(const PatchLattice& accepted, const Camera& reference, AcceptedDepth& visible,
-                        ThreadPool& pool);
+class AcceptedDepthBuffer {
+ public:
+  AcceptedDepthBuffer(const Camera& reference, int step);
+
+  void Add(const SparseSurface& accepted, ThreadPool& pool);
+
+  // Once all are added.
+  AcceptedDepth Depth() const;
+
+ private:
+  // (depth, quality) in one number that is smaller when the depth is smaller, or equal and the quality higher. The
+  // least of a set of such numbers does not depend on the order in which threads bring them.
+  using Key = uint64_t;
+
+  const Camera reference_;
+  const Lattice lattice_;
+  std::vector<Key> keys_;
+};
 
 }  // namespace meshwright

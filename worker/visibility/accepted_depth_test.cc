@@ -29,6 +29,12 @@ Camera CameraAt(const Eigen::Vector3d& center, double yaw, int width, int height
   return camera;
 }
 
+AcceptedDepth Visible(const std::vector<PatchLattice>& surfaces, const Camera& reference, int step, ThreadPool& pool) {
+  AcceptedDepthBuffer buffer(reference, step);
+  for (const PatchLattice& surface : surfaces) buffer.Add(SparseSurface::From(surface), pool);
+  return buffer.Depth();
+}
+
 // A surface seen by `camera` whose depth is depth(column, row), with nodes missing at random.
 template <typename DepthFunction>
 PatchLattice MakeSurface(const Camera& camera, int step, double missing, uint32_t seed, const DepthFunction& depth) {
@@ -134,8 +140,7 @@ TEST(AcceptedDepthTest, EqualsIntersectionOfEveryRayWithEveryTriangle) {
   for (const Camera& reference : {aside, close}) {
     for (const int step : {1, 2}) {
       const PatchLattice surface = Wavy(source, 2, 7);
-      AcceptedDepth visible = AcceptedDepth::Empty(reference, step);
-      AddAcceptedSurface(surface, reference, visible, pool);
+      const AcceptedDepth visible = Visible({surface}, reference, step, pool);
       ExpectEqualsSlowTwin(visible, surface, reference);
     }
   }
@@ -146,8 +151,7 @@ TEST(AcceptedDepthTest, SeesItsOwnSurfaceAsItIs) {
   const Camera camera = CameraAt({0.3, -0.2, 0.1}, 0.4, 100, 60, 90);
   const PatchLattice surface =
       MakeSurface(camera, 2, 0, 1, [](int column, int row) { return 4 + 0.01 * column * row; });
-  AcceptedDepth visible = AcceptedDepth::Empty(camera, 2);
-  AddAcceptedSurface(surface, camera, visible, pool);
+  const AcceptedDepth visible = Visible({surface}, camera, 2, pool);
   for (size_t i = 0; i < surface.depth.size(); ++i) {
     EXPECT_NEAR(visible.depth[i], surface.depth[i], 1e-5 * surface.depth[i]);
     EXPECT_NEAR(visible.quality[i], surface.quality[i], 1e-5);
@@ -160,8 +164,7 @@ TEST(AcceptedDepthTest, AWholeSurfaceHasNoGapsBetweenItsTriangles) {
   const Camera reference = CameraAt({0.4, 0.1, 2.0}, 0.05, 300, 300, 900);  // sees only the middle, in fine detail
   const PatchLattice surface =
       MakeSurface(source, 1, 0, 3, [](int column, int row) { return 5 + 0.05 * ((column * 7 + row * 13) % 11); });
-  AcceptedDepth visible = AcceptedDepth::Empty(reference, 1);
-  AddAcceptedSurface(surface, reference, visible, pool);
+  const AcceptedDepth visible = Visible({surface}, reference, 1, pool);
   EXPECT_THAT(visible.depth, testing::Each(testing::Gt(0.0F)));
 }
 
@@ -177,16 +180,14 @@ TEST(AcceptedDepthTest, OrderOfSurfacesAndNumberOfThreadsDoNotMatter) {
   for (float& quality : surfaces.back().quality) quality *= 0.9F;
 
   ThreadPool one(1);
-  AcceptedDepth expected = AcceptedDepth::Empty(reference, 1);
-  for (const PatchLattice& surface : surfaces) AddAcceptedSurface(surface, reference, expected, one);
+  const AcceptedDepth expected = Visible(surfaces, reference, 1, one);
   ASSERT_GT(std::count_if(expected.depth.begin(), expected.depth.end(), [](float z) { return z > 0; }), 1000);
 
   ThreadPool three(3);
   std::mt19937 random(5);
   for (int repetition = 0; repetition < 4; ++repetition) {
     std::shuffle(surfaces.begin(), surfaces.end(), random);
-    AcceptedDepth visible = AcceptedDepth::Empty(reference, 1);
-    for (const PatchLattice& surface : surfaces) AddAcceptedSurface(surface, reference, visible, three);
+    const AcceptedDepth visible = Visible(surfaces, reference, 1, three);
     EXPECT_EQ(visible.depth, expected.depth);
     EXPECT_EQ(visible.quality, expected.quality);
   }
@@ -197,8 +198,7 @@ TEST(AcceptedDepthTest, BacksOfSurfacesHideNothing) {
   const Camera source = CameraAt({0, 0, 0}, 0, 100, 100, 100);
   const PatchLattice surface = MakeSurface(source, 1, 0, 1, [](int, int) { return 4.0; });
   const Camera behind = CameraAt({0, 0, 8}, std::acos(-1.0), 100, 100, 100);
-  AcceptedDepth visible = AcceptedDepth::Empty(behind, 1);
-  AddAcceptedSurface(surface, behind, visible, pool);
+  const AcceptedDepth visible = Visible({surface}, behind, 1, pool);
   EXPECT_THAT(visible.depth, testing::Each(0.0F));
 }
 
@@ -207,19 +207,16 @@ TEST(AcceptedDepthTest, WhatIsBehindTheCameraOrInNoTriangleIsLeftOut) {
   const Camera source = CameraAt({0, 0, 0}, 0, 100, 100, 100);
   PatchLattice surface = MakeSurface(source, 1, 0, 1, [](int, int) { return 4.0; });
   const Camera beyond = CameraAt({0, 0, 5}, 0, 100, 100, 100);
-  AcceptedDepth visible = AcceptedDepth::Empty(beyond, 1);
-  AddAcceptedSurface(surface, beyond, visible, pool);
+  AcceptedDepth visible = Visible({surface}, beyond, 1, pool);
   EXPECT_THAT(visible.depth, testing::Each(0.0F));
 
   // The camera stands in the plane of the surface.
   const Camera inside = CameraAt({0, 0, 4}, 0.3, 100, 100, 100);
-  visible = AcceptedDepth::Empty(inside, 1);
-  AddAcceptedSurface(surface, inside, visible, pool);
+  visible = Visible({surface}, inside, 1, pool);
   for (const float depth : visible.depth) EXPECT_TRUE(std::isfinite(depth));
 
   std::fill(surface.links.begin(), surface.links.end(), uint8_t{0});
-  visible = AcceptedDepth::Empty(source, 1);
-  AddAcceptedSurface(surface, source, visible, pool);
+  visible = Visible({surface}, source, 1, pool);
   EXPECT_THAT(visible.depth, testing::Each(0.0F));
 }
 
