@@ -26,6 +26,11 @@ void NameInEnvironment(CLI::Option* option) {
   option->envname(name);
 }
 
+void AddMetricsOption(CLI::App& program, std::string& address) {
+  NameInEnvironment(program.add_option("--metrics-listen", address,
+                                       "host:port for Prometheus (/metrics) and probes (/healthz, /readyz) [none]"));
+}
+
 sigset_t StopSignals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -86,6 +91,7 @@ void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {
                                     "after SIGTERM, jobs may take so long before they are given back")
                         ->check(CLI::Range(0.0, 86400.0))
                         ->capture_default_str());
+  AddMetricsOption(program, settings.metrics_listen);
 }
 
 void AddConfigOption(CLI::App& program) {

@@ -26,6 +26,10 @@ int main(int argc, char** argv) {
   }
   const auto worker = WorkerProgram::Make(settings);
   if (!worker.ok()) return Fail(worker.status());
+  if (const int port = (*worker)->metrics_port(); port > 0) {
+    std::printf("metrics on port %d\n", port);
+    std::fflush(stdout);
+  }
   std::thread([&] {
     WaitForStopSignal();
     (*worker)->Drain();

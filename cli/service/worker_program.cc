@@ -10,9 +10,14 @@
 
 #include "cli/service/open_stores.h"
 #include "cli/service/parse_method.h"
+#include "common/base/clock.h"
 #include "common/base/status_macros.h"
+#include "common/telemetry/measured_blob_store.h"
+#include "common/telemetry/metrics.h"
+#include "common/telemetry/metrics_server.h"
 #include "worker/agent/agent.h"
 #include "worker/agent/grpc_coordinator.h"
+#include "worker/telemetry/measured_worker_channel.h"
 
 namespace meshwright {
 namespace {
@@ -34,15 +39,28 @@ class RealWorkerProgram final : public WorkerProgram {
       : id_(settings.id.empty() ? DefaultId() : settings.id),
         coordinator_(std::move(coordinator)),
         shared_blobs_(std::move(shared_blobs)),
-        agent_({.worker_id = id_,
-                .version = MW_VERSION,
-                .cores = settings.cores,
-                .memory_bytes = MemoryMib(settings) << 20,
-                .drain = absl::Seconds(settings.drain_seconds)},
-               *coordinator_, shared_blobs_ != nullptr ? *shared_blobs_ : *coordinator_, ParseWorkerMethod,
-               RunCameraJob, [this](const std::string& line) { Log(line); }) {}
+        metrics_("worker"),
+        channel_(*coordinator_, metrics_, clock_),
+        blobs_(shared_blobs_ != nullptr ? *shared_blobs_ : *coordinator_, metrics_),
+        agent_(
+            {.worker_id = id_,
+             .version = MW_VERSION,
+             .cores = settings.cores,
+             .memory_bytes = MemoryMib(settings) << 20,
+             .drain = absl::Seconds(settings.drain_seconds)},
+            channel_, blobs_, ParseWorkerMethod,
+            [](const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
+              return RunCameraJob(input, options, pool);
+            },
+            [this](const std::string& line) { Log(line); }) {}
+
+  absl::Status ServeMetrics(const std::string& address) {
+    MW_ASSIGN_OR_RETURN(metrics_server_, MetricsServer::Start(address, metrics_, [this] { return channel_.Ready(); }));
+    return absl::OkStatus();
+  }
 
   void Run() override { agent_.Run(); }
+  int metrics_port() const override { return metrics_server_ != nullptr ? metrics_server_->port() : 0; }
   void Drain() override {
     Log("draining");
     agent_.Drain();
@@ -57,7 +75,12 @@ class RealWorkerProgram final : public WorkerProgram {
   const std::string id_;
   const std::unique_ptr<GrpcCoordinator> coordinator_;
   const std::unique_ptr<BlobStore> shared_blobs_;
+  const RealClock clock_;
+  Metrics metrics_;
+  MeasuredWorkerChannel channel_;
+  MeasuredBlobStore blobs_;
   Agent agent_;
+  std::unique_ptr<MetricsServer> metrics_server_;
 };
 
 }  // namespace
@@ -67,8 +90,10 @@ absl::StatusOr<std::unique_ptr<WorkerProgram>> WorkerProgram::Make(const WorkerS
   if (!settings.blobs.empty()) {
     MW_ASSIGN_OR_RETURN(shared_blobs, OpenBlobStore(settings.blobs));
   }
-  return std::make_unique<RealWorkerProgram>(settings, GrpcCoordinator::Connect(settings.coordinator),
-                                             std::move(shared_blobs));
+  auto program = std::make_unique<RealWorkerProgram>(settings, GrpcCoordinator::Connect(settings.coordinator),
+                                                     std::move(shared_blobs));
+  if (!settings.metrics_listen.empty()) MW_RETURN_IF_ERROR(program->ServeMetrics(settings.metrics_listen));
+  return program;
 }
 
 }  // namespace meshwright

@@ -14,6 +14,7 @@ struct WorkerSettings {
   int cores = 1;
   int64_t memory_mib = 0;  // 0: 512 for each core, at least 1024
   double drain_seconds = 30;
+  std::string metrics_listen;  // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
 };
 
 // A worker as meshwright-worker and "meshwright up" run it.
@@ -24,6 +25,7 @@ class WorkerProgram {
   // Until Drain() and what follows from it.
   virtual void Run() = 0;
   virtual void Drain() = 0;
+  virtual int metrics_port() const = 0;  // 0: none
 };
 
 }  // namespace meshwright
