@@ -64,6 +64,17 @@ TEST(CommandLineTest, InspectSaysWhatWillBeDone) {
   EXPECT_THAT(RunMeshwright({"inspect", SharedScene("small")}).out, testing::HasSubstr("8 photographs"));
 }
 
+TEST(CommandLineTest, ThePageOfOptionsIsWhatTheProgramHas) {
+  EXPECT_EQ(ReadBytes("docs/options.md"), RunMeshwright({"options", "--markdown"}).out)
+      << "write it anew: meshwright options --markdown > docs/options.md";
+  const nlohmann::json options = JsonOf(RunMeshwright({"options", "--json"}));
+  const std::string help = RunMeshwright({"reconstruct", "--help"}).out;
+  ASSERT_GT(options.size(), 10U);
+  for (const nlohmann::json& option : options) {
+    EXPECT_THAT(help, testing::HasSubstr("--" + option["name"].get<std::string>()));
+  }
+}
+
 TEST(CommandLineTest, ProgressGoesToStderrAndResultsToStdout) {
   const TemporaryFolder folder;
   const RunResult result =
