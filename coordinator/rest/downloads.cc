@@ -1,0 +1,175 @@
+#include "coordinator/rest/downloads.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include <absl/strings/match.h>
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
+#include <absl/strings/strip.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/base/digest.h"
+#include "common/base/status_macros.h"
+#include "coordinator/rest/problem.h"
+
+namespace meshwright {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kPieceBytes = size_t{256} << 10;
+constexpr size_t kFilesKept = 8;
+
+std::string Quoted(const std::string& etag) { return absl::StrCat("\"", etag, "\""); }
+
+bool IsNumber(const std::string& text) {
+  return !text.empty() && text.size() <= 18 && text.find_first_not_of("0123456789") == std::string::npos;
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<const OpenedFile>> OpenedFile::Open(const std::string& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  struct stat status = {};
+  if (descriptor >= 0 && ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode)) {
+    return std::shared_ptr<const OpenedFile>(new OpenedFile(descriptor, status.st_size));
+  }
+  if (descriptor >= 0) ::close(descriptor);
+  return errno == ENOENT ? absl::NotFoundError("the file is not there")
+                         : absl::DataLossError("the file cannot be read");
+}
+
+OpenedFile::~OpenedFile() { ::close(descriptor_); }
+
+absl::StatusOr<size_t> OpenedFile::Read(int64_t offset, char* bytes, size_t count) const {
+  while (true) {
+    const ssize_t got = ::pread(descriptor_, bytes, count, offset);
+    if (got > 0) return static_cast<size_t>(got);
+    if (got == 0 || errno != EINTR) return absl::DataLossError("the file cannot be read");
+  }
+}
+
+ByteRange ParseByteRange(const std::string& header, int64_t size_bytes) {
+  constexpr char kUnit[] = "bytes=";
+  const ByteRange whole = {ByteRange::Kind::kWhole, 0, size_bytes};
+  if (!absl::StartsWith(header, kUnit)) return whole;
+  const std::vector<std::string> ends = absl::StrSplit(header.substr(sizeof(kUnit) - 1), '-');
+  if (ends.size() != 2) return whole;
+  int64_t first = 0;
+  int64_t last = 0;
+  if (ends[0].empty()) {  // the last so many bytes
+    if (!IsNumber(ends[1]) || !absl::SimpleAtoi(ends[1], &last)) return whole;
+    if (last == 0 || size_bytes == 0) return {ByteRange::Kind::kUnsatisfiable};
+    const int64_t count = std::min(last, size_bytes);
+    return {ByteRange::Kind::kPart, size_bytes - count, count};
+  }
+  if (!IsNumber(ends[0]) || !absl::SimpleAtoi(ends[0], &first)) return whole;
+  last = size_bytes - 1;
+  if (!ends[1].empty()) {
+    if (!IsNumber(ends[1]) || !absl::SimpleAtoi(ends[1], &last) || last < first) return whole;
+    last = std::min(last, size_bytes - 1);
+  }
+  if (first >= size_bytes) return {ByteRange::Kind::kUnsatisfiable};
+  return {ByteRange::Kind::kPart, first, last - first + 1};
+}
+
+bool HasCopy(const RestCall& call, const std::string& etag) {
+  const std::string header = call.request.get_header_value("If-None-Match");
+  for (absl::string_view candidate : absl::StrSplit(header, ',')) {
+    candidate = absl::StripAsciiWhitespace(candidate);
+    absl::ConsumePrefix(&candidate, "W/");
+    if (candidate == "*" || candidate == Quoted(etag)) return true;
+  }
+  return false;
+}
+
+absl::Status SendFile(RestCall& call, std::shared_ptr<const OpenedFile> file, const std::string& etag,
+                      const std::string& content_type, const std::string& name) {
+  call.response.set_header("ETag", Quoted(etag));
+  call.response.set_header("Accept-Ranges", "bytes");
+  call.response.set_header("Cache-Control", "no-cache");
+  if (HasCopy(call, etag)) {
+    call.response.status = 304;
+    return absl::OkStatus();
+  }
+  const std::string if_range = call.request.get_header_value("If-Range");
+  const std::string header = call.request.get_header_value("Range");
+  const ByteRange range = if_range.empty() || if_range == Quoted(etag) ? ParseByteRange(header, file->size_bytes())
+                                                                       : ParseByteRange("", file->size_bytes());
+  if (range.kind == ByteRange::Kind::kUnsatisfiable) {
+    call.response.set_header("Content-Range", absl::StrCat("bytes */", file->size_bytes()));
+    return FieldError(
+        "Range", HttpError(416, absl::OutOfRangeError(absl::StrCat("Range is \"", header.substr(0, 64),
+                                                                   "\", expected bytes of ", file->size_bytes()))));
+  }
+  call.response.status = 200;
+  if (range.kind == ByteRange::Kind::kPart) {
+    call.response.status = 206;
+    call.response.set_header("Content-Range", absl::StrCat("bytes ", range.first, "-", range.first + range.count - 1,
+                                                           "/", file->size_bytes()));
+  }
+  call.response.set_header("Content-Disposition", absl::StrCat("attachment; filename=\"", name, "\""));
+  if (range.count == 0) {
+    call.response.set_content("", content_type);
+    return absl::OkStatus();
+  }
+  call.response.set_content_provider(
+      static_cast<size_t>(range.count), content_type,
+      [file = std::move(file), first = range.first](size_t offset, size_t length, httplib::DataSink& sink) {
+        std::vector<char> piece(std::min(length, kPieceBytes));
+        const auto got = file->Read(first + static_cast<int64_t>(offset), piece.data(), piece.size());
+        return got.ok() && sink.write(piece.data(), *got);
+      });
+  return absl::OkStatus();
+}
+
+absl::Status SendForever(RestCall& call, const std::string& etag, const std::string& content_type,
+                         const std::function<absl::StatusOr<std::string>()>& make) {
+  if (HasCopy(call, etag)) {
+    call.response.status = 304;
+  } else {
+    MW_ASSIGN_OR_RETURN(const std::string bytes, make());
+    call.response.status = 200;
+    call.response.set_content(bytes, content_type);
+  }
+  call.response.set_header("ETag", Quoted(etag));
+  call.response.set_header("Cache-Control", "private, max-age=31536000, immutable");
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<DerivedFiles>> DerivedFiles::Open(const std::string& folder) {
+  std::error_code error;
+  fs::remove_all(folder, error);
+  fs::create_directories(folder, error);
+  if (error) {
+    return absl::PermissionDeniedError(absl::StrCat(folder, ": cannot make the folder: ", error.message()));
+  }
+  return std::unique_ptr<DerivedFiles>(new DerivedFiles(folder));
+}
+
+absl::StatusOr<std::shared_ptr<const OpenedFile>> DerivedFiles::Get(
+    const std::string& key, const std::function<absl::Status(const std::string&)>& make) {
+  const std::string path = absl::StrCat(folder_, "/", Sha256Hex(key));
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (last_use_.count(path) == 0) {
+    MW_RETURN_IF_ERROR(make(path));
+    while (last_use_.size() >= kFilesKept) {
+      const auto oldest = std::min_element(last_use_.begin(), last_use_.end(),
+                                           [](const auto& a, const auto& b) { return a.second < b.second; });
+      std::error_code error;
+      fs::remove(oldest->first, error);
+      last_use_.erase(oldest);
+    }
+  }
+  last_use_[path] = ++uses_;
+  return OpenedFile::Open(path);
+}
+
+}  // namespace meshwright

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "coordinator/rest/router.h"
+
+namespace meshwright {
+
+// A file that is open for reading; it stays readable when its name is removed.
+class OpenedFile {
+ public:
+  static absl::StatusOr<std::shared_ptr<const OpenedFile>> Open(const std::string& path);
+  ~OpenedFile();
+  OpenedFile(const OpenedFile&) = delete;
+  OpenedFile& operator=(const OpenedFile&) = delete;
+
+  int64_t size_bytes() const { return size_bytes_; }
+  // Reads up to `count` bytes; DataLoss when there are none.
+  absl::StatusOr<size_t> Read(int64_t offset, char* bytes, size_t count) const;
+
+ private:
+  OpenedFile(int descriptor, int64_t size_bytes) : descriptor_(descriptor), size_bytes_(size_bytes) {}
+  const int descriptor_;
+  const int64_t size_bytes_;
+};
+
+// What one range of a Range header (RFC 9110, section 14) means for `size_bytes` bytes.
+struct ByteRange {
+  enum class Kind { kWhole, kPart, kUnsatisfiable };
+  Kind kind = Kind::kWhole;
+  int64_t first = 0;
+  int64_t count = 0;
+};
+// Whole when the header is not one range that can be understood, as the RFC asks.
+ByteRange ParseByteRange(const std::string& header, int64_t size_bytes);
+
+// Answers with the file or the range of it that was asked for: 200, 206, 304 or 416. `etag` without its quotation
+// marks. `name` is what a browser saves it as.
+absl::Status SendFile(RestCall& call, std::shared_ptr<const OpenedFile> file, const std::string& etag,
+                      const std::string& content_type, const std::string& name);
+
+// Answers with bytes that never change under this path, or with 304.
+absl::Status SendForever(RestCall& call, const std::string& etag, const std::string& content_type,
+                         const std::function<absl::StatusOr<std::string>()>& make);
+
+// Whether the client's copy is good.
+bool HasCopy(const RestCall& call, const std::string& etag);
+
+// Files that are made from others when they are asked for, one at a time, so that memory stays bounded. The last few
+// are kept. Thread-safe.
+class DerivedFiles {
+ public:
+  // Makes the folder, or empties it.
+  static absl::StatusOr<std::unique_ptr<DerivedFiles>> Open(const std::string& folder);
+
+  // The file of this key, which `make` writes to a path when it is not there. The same key means the same bytes.
+  absl::StatusOr<std::shared_ptr<const OpenedFile>> Get(const std::string& key,
+                                                        const std::function<absl::Status(const std::string&)>& make);
+
+ private:
+  explicit DerivedFiles(std::string folder) : folder_(std::move(folder)) {}
+  const std::string folder_;
+  std::mutex mutex_;
+  int64_t uses_ = 0;
+  std::map<std::string, int64_t> last_use_;  // path -> the last one of uses_
+};
+
+}  // namespace meshwright

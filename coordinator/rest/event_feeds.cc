@@ -1,0 +1,185 @@
+#include "coordinator/rest/event_feeds.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+
+#include "common/base/status_macros.h"
+#include "coordinator/rest/json.h"
+
+namespace meshwright {
+namespace {
+
+// So many events are handed to a client at a time, at most: what it does not read takes no more memory than that.
+constexpr size_t kEventsAtATime = 64;
+constexpr char kRetry[] = "retry: 2000\n\n";
+
+std::string Event(int64_t id, const char* name, const std::string& data) {
+  return absl::StrCat("id: ", id, "\nevent: ", name, "\ndata: ", data, "\n\n");
+}
+
+}  // namespace
+
+// One watched reconstruction. Needs the lock.
+struct EventFeeds::Feed {
+  struct PartEvent {
+    int64_t sequence = 0;
+    std::string json;
+  };
+  int watchers = 0;
+  int64_t version = 0;  // of `reconstruction`; 0: not looked at yet
+  std::string reconstruction;
+  int64_t committed = -1;  // as of which the parts were listed
+  std::vector<PartEvent> parts;
+  bool over = false;  // nothing will change any more
+  bool gone = false;  // deleted, or the store cannot be reached
+};
+
+EventFeeds::EventFeeds(const ReconstructionLogic& logic, const EventFeedOptions& options)
+    : logic_(logic), options_(options), thread_([this] { Run(); }) {}
+
+EventFeeds::~EventFeeds() {
+  Shutdown();
+  thread_.join();
+}
+
+void EventFeeds::Shutdown() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+  }
+  news_.notify_all();
+  wake_.notify_all();
+}
+
+int EventFeeds::streams() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return streams_;
+}
+
+absl::StatusOr<std::unique_ptr<EventFeeds::Stream>> EventFeeds::Open(const std::string& id, int64_t after_part) {
+  MW_RETURN_IF_ERROR(logic_.Get(id).status());
+  std::unique_ptr<Stream> stream;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (stopping_) return absl::UnavailableError("the coordinator is going down");
+    if (streams_ >= options_.max_streams) {
+      return absl::UnavailableError(absl::StrCat("there are ", streams_, " event streams, expected fewer than ",
+                                                 options_.max_streams, "; try again later"));
+    }
+    std::shared_ptr<Feed>& feed = feeds_[id];
+    if (feed == nullptr) feed = std::make_shared<Feed>();
+    ++feed->watchers;
+    ++streams_;
+    stream = std::unique_ptr<Stream>(new Stream(*this, id, feed, after_part));
+  }
+  wake_.notify_all();
+  return stream;
+}
+
+void EventFeeds::Run() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!stopping_) {
+    const std::map<std::string, std::shared_ptr<Feed>> watched = feeds_;
+    lock.unlock();
+    bool changing = false;
+    for (const auto& [id, feed] : watched) {
+      Look(id, feed);
+      changing = true;
+    }
+    lock.lock();
+    const auto fresh = [&] {
+      return stopping_ || std::any_of(feeds_.begin(), feeds_.end(), [](const auto& entry) {
+               return entry.second->version == 0 && !entry.second->gone;
+             });
+    };
+    if (changing) {
+      wake_.wait_for(lock, absl::ToChronoMilliseconds(options_.look_again), fresh);
+    } else {
+      wake_.wait(lock, fresh);
+    }
+  }
+}
+
+void EventFeeds::Look(const std::string& id, const std::shared_ptr<Feed>& feed) {
+  int64_t committed = 0;
+  size_t known = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (feed->over || feed->gone) return;
+    committed = feed->committed;
+    known = feed->parts.size();
+  }
+  const absl::StatusOr<v1::Reconstruction> now = logic_.Get(id);
+  const bool over = now.ok() && IsOver(now->state());
+  std::vector<Feed::PartEvent> added;
+  absl::Status status = now.status();
+  if (status.ok() && (over || now->progress().cameras_committed() != committed)) {
+    const absl::StatusOr<v1::ListPartsResponse> parts = logic_.ListParts(id);
+    status = parts.status();
+    for (int i = static_cast<int>(known); parts.ok() && i < parts->parts_size(); ++i) {
+      added.push_back({parts->parts(i).sequence(), ToJson(parts->parts(i))});
+    }
+  }
+  const std::string json = status.ok() ? ToJson(*now) : "";
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!status.ok()) {
+      // Whoever comes back hears why.
+      feed->gone = true;
+      const auto found = feeds_.find(id);
+      if (found != feeds_.end() && found->second == feed) feeds_.erase(found);
+    } else {
+      if (json != feed->reconstruction) {
+        feed->reconstruction = json;
+        ++feed->version;
+      }
+      feed->committed = now->progress().cameras_committed();
+      for (Feed::PartEvent& part : added) feed->parts.push_back(std::move(part));
+      feed->over = over;
+    }
+  }
+  news_.notify_all();
+}
+
+EventFeeds::Stream::Stream(EventFeeds& feeds, std::string id, std::shared_ptr<Feed> feed, int64_t after_part)
+    : feeds_(feeds), id_(std::move(id)), feed_(std::move(feed)), last_part_(after_part) {}
+
+EventFeeds::Stream::~Stream() {
+  const std::lock_guard<std::mutex> lock(feeds_.mutex_);
+  --feeds_.streams_;
+  if (--feed_->watchers > 0) return;
+  const auto found = feeds_.feeds_.find(id_);
+  if (found != feeds_.feeds_.end() && found->second == feed_) feeds_.feeds_.erase(found);
+}
+
+std::string EventFeeds::Stream::Next() {
+  std::unique_lock<std::mutex> lock(feeds_.mutex_);
+  while (true) {
+    if (ended_ || feeds_.stopping_ || feed_->gone) return "";
+    std::string text;
+    if (feed_->version != told_version_) {
+      if (told_version_ == 0) text = kRetry;
+      told_version_ = feed_->version;
+      absl::StrAppend(&text, Event(last_part_, "reconstruction", feed_->reconstruction));
+    }
+    for (size_t count = 0; count < kEventsAtATime && next_part_ < feed_->parts.size(); ++next_part_) {
+      const Feed::PartEvent& part = feed_->parts[next_part_];
+      if (part.sequence <= last_part_) continue;
+      last_part_ = part.sequence;
+      absl::StrAppend(&text, Event(last_part_, "part", part.json));
+      ++count;
+    }
+    if (feed_->over && next_part_ == feed_->parts.size()) {
+      absl::StrAppend(&text, Event(last_part_, "end", "{}"));
+      ended_ = true;
+    }
+    if (!text.empty()) return text;
+    if (feeds_.news_.wait_for(lock, absl::ToChronoMilliseconds(feeds_.options_.heartbeat)) == std::cv_status::timeout) {
+      return ":\n\n";
+    }
+  }
+}
+
+}  // namespace meshwright

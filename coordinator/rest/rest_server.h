@@ -1,0 +1,45 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "common/blob/blob_store.h"
+#include "coordinator/api/reconstruction_logic.h"
+#include "coordinator/api/worker_logic.h"
+
+namespace meshwright {
+
+struct RestOptions {
+  std::string listen;       // "host:port"; port 0 takes a free one
+  std::string folder;       // uploads that are not complete, converted meshes
+  std::string page_folder;  // the dashboard's files; "": none
+  std::string token;        // that callers have to show; "": none
+  int max_event_streams = 200;
+  int patience_seconds = 10;  // clients that neither send nor take anything for so long are dropped
+};
+
+// What the server is a shell over. All of it outlives the server.
+struct RestServices {
+  ReconstructionLogic* reconstructions = nullptr;
+  WorkerLogic* workers = nullptr;
+  BlobStore* blobs = nullptr;
+  std::function<absl::Status()> ready;  // whether store and blobs can be reached
+  std::string options_json;             // the answer of GET /v1/options
+};
+
+// The public interface over HTTP, as openapi.yaml says, and the dashboard's files: a thin shell over the logic.
+class RestServer {
+ public:
+  // InvalidArgument, or Unavailable when the port is taken.
+  static absl::StatusOr<std::unique_ptr<RestServer>> Start(const RestOptions& options, const RestServices& services);
+  virtual ~RestServer() = default;
+  virtual int port() const = 0;
+  // Ends event streams and downloads, answers what waits, takes nothing new.
+  virtual void Shutdown() = 0;
+};
+
+}  // namespace meshwright

@@ -1,0 +1,123 @@
+#include <limits>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+
+#include "common/base/digest.h"
+#include "common/base/status_macros.h"
+#include "common/mesh/glb.h"
+#include "common/mesh/ply.h"
+#include "common/mesh/surface_union.h"
+#include "common/surface/codec.h"
+#include "coordinator/rest/json.h"
+#include "coordinator/rest/part_preview.h"
+#include "coordinator/rest/problem.h"
+#include "coordinator/rest/routes.h"
+
+namespace meshwright {
+namespace {
+
+constexpr char kPlyType[] = "model/ply";
+constexpr int64_t kDefaultPreviewFaces = 20'000;
+constexpr int64_t kMaxPreviewFaces = 4'000'000;
+// A conversion takes several times as much memory.
+constexpr int64_t kMaxGlbSourceBytes = int64_t{1} << 30;
+
+absl::StatusOr<v1::Part> FindPart(const RestContext& context, const RestCall& call) {
+  MW_ASSIGN_OR_RETURN(const int64_t sequence, PathNumber(call, "sequence", 1, std::numeric_limits<int32_t>::max()));
+  MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts, context.reconstructions->ListParts(call.path.at("id")));
+  for (const v1::Part& part : parts.parts()) {
+    if (part.sequence() == sequence) return part;
+  }
+  return absl::NotFoundError(
+      absl::StrCat("sequence is ", sequence, ", which is no part of reconstruction ", call.path.at("id")));
+}
+
+absl::Status ListParts(const RestContext& context, RestCall& call) {
+  MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts, context.reconstructions->ListParts(call.path.at("id")));
+  call.response.set_content(ToJson(parts), kJsonType);
+  return absl::OkStatus();
+}
+
+absl::Status DownloadPart(const RestContext& context, RestCall& call) {
+  MW_ASSIGN_OR_RETURN(const v1::Part part, FindPart(context, call));
+  const std::string key = absl::StrCat("part-", part.sha256());
+  MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& path) -> absl::Status {
+    MW_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->Get(part.sha256()));
+    MW_ASSIGN_OR_RETURN(const PatchLattice surface, DecodeSurface(bytes));
+    return WriteSurfacePart(surface, path);
+  }));
+  return SendFile(call, std::move(file), key, kPlyType, absl::StrCat(call.path.at("id"), "-", part.sequence(), ".ply"));
+}
+
+absl::Status PreviewPart(const RestContext& context, RestCall& call) {
+  MW_ASSIGN_OR_RETURN(const int64_t max_faces,
+                      QueryNumber(call, "max_faces", 1, kMaxPreviewFaces, kDefaultPreviewFaces));
+  MW_ASSIGN_OR_RETURN(const v1::Part part, FindPart(context, call));
+  const std::string etag = absl::StrCat(part.sha256(), "-", part.sequence(), "-", max_faces);
+  return SendForever(call, etag, "application/octet-stream", [&]() -> absl::StatusOr<std::string> {
+    MW_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->Get(part.sha256()));
+    MW_ASSIGN_OR_RETURN(const SparseSurface surface, DecodeSparseSurface(bytes));
+    return MakePartPreview(surface, part.sequence(), max_faces);
+  });
+}
+
+// The parts accepted so far, side by side.
+absl::Status SendPartialMesh(const RestContext& context, RestCall& call) {
+  const std::string& id = call.path.at("id");
+  MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts, context.reconstructions->ListParts(id));
+  std::string digests;
+  for (const v1::Part& part : parts.parts()) digests += part.sha256();
+  const std::string key = absl::StrCat("union-", Sha256Hex(digests));
+  MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& path) {
+    const auto load = [&](int64_t index) -> absl::StatusOr<PatchLattice> {
+      MW_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->Get(parts.parts(static_cast<int>(index)).sha256()));
+      return DecodeSurface(bytes);
+    };
+    return WriteSurfaceUnion(parts.parts_size(), load, path).status();
+  }));
+  return SendFile(call, std::move(file), key, kPlyType, absl::StrCat(id, "-partial.ply"));
+}
+
+absl::Status DownloadMesh(const RestContext& context, RestCall& call) {
+  const std::string& id = call.path.at("id");
+  MW_ASSIGN_OR_RETURN(const bool partial, QueryFlag(call, "partial"));
+  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, context.reconstructions->Get(id));
+  if (partial && reconstruction.state() != v1::RECONSTRUCTION_STATE_DONE) return SendPartialMesh(context, call);
+  MW_ASSIGN_OR_RETURN(const std::string path, context.reconstructions->MeshPath(id));
+  MW_ASSIGN_OR_RETURN(auto file, OpenedFile::Open(path));
+  return SendFile(call, std::move(file), reconstruction.mesh_sha256(), kPlyType, absl::StrCat(id, ".ply"));
+}
+
+absl::Status DownloadGlb(const RestContext& context, RestCall& call) {
+  const std::string& id = call.path.at("id");
+  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, context.reconstructions->Get(id));
+  MW_ASSIGN_OR_RETURN(const std::string mesh_path, context.reconstructions->MeshPath(id));
+  if (reconstruction.mesh_bytes() > kMaxGlbSourceBytes) {
+    return HttpError(413, absl::ResourceExhaustedError(absl::StrCat("the mesh has ", reconstruction.mesh_bytes(),
+                                                                    " bytes, converted are up to ", kMaxGlbSourceBytes,
+                                                                    "; download the PLY")));
+  }
+  const std::string key = absl::StrCat("glb-", reconstruction.mesh_sha256());
+  MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& path) -> absl::Status {
+    MW_ASSIGN_OR_RETURN(const TriangleMesh mesh, ReadPly(mesh_path));
+    return WriteGlb(mesh, path);
+  }));
+  return SendFile(call, std::move(file), key, "model/gltf-binary", absl::StrCat(id, ".glb"));
+}
+
+}  // namespace
+
+void AddResultRoutes(const RestContext& context, std::vector<Route>& routes) {
+  const auto add = [&](const char* path, std::vector<std::string> query, auto handler) {
+    routes.push_back({"GET", path, std::move(query),
+                      [&context, handler](RestCall& call) -> absl::Status { return handler(context, call); }});
+  };
+  add("/v1/reconstructions/{id}/parts", {}, ListParts);
+  add("/v1/reconstructions/{id}/parts/{sequence}", {}, DownloadPart);
+  add("/v1/reconstructions/{id}/parts/{sequence}/preview", {"max_faces"}, PreviewPart);
+  add("/v1/reconstructions/{id}/mesh", {"partial"}, DownloadMesh);
+  add("/v1/reconstructions/{id}/mesh.glb", {}, DownloadGlb);
+}
+
+}  // namespace meshwright

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+
+#include "common/blob/blob_store.h"
+#include "coordinator/api/reconstruction_logic.h"
+#include "coordinator/api/worker_logic.h"
+#include "coordinator/rest/downloads.h"
+#include "coordinator/rest/event_feeds.h"
+#include "coordinator/rest/router.h"
+#include "coordinator/rest/scene_uploads.h"
+
+namespace meshwright {
+
+// What handlers work with. All of it outlives them.
+struct RestContext {
+  ReconstructionLogic* reconstructions = nullptr;
+  WorkerLogic* workers = nullptr;
+  BlobStore* blobs = nullptr;
+  SceneUploads* uploads = nullptr;
+  DerivedFiles* derived = nullptr;
+  EventFeeds* feeds = nullptr;
+  std::function<absl::Status()> ready;
+  std::string options_json;  // the answer of GET /v1/options
+};
+
+// Handlers of the paths in the OpenAPI file, by what they are about.
+void AddReconstructionRoutes(const RestContext& context, std::vector<Route>& routes);
+void AddSceneRoutes(const RestContext& context, std::vector<Route>& routes);
+void AddResultRoutes(const RestContext& context, std::vector<Route>& routes);
+void AddClusterRoutes(const RestContext& context, std::vector<Route>& routes);
+
+// All of them, in an order in which the first that fits is the right one.
+std::vector<Route> MakeRoutes(const RestContext& context);
+
+constexpr char kJsonType[] = "application/json";
+
+}  // namespace meshwright

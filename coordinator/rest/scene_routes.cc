@@ -1,0 +1,97 @@
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+
+#include "common/base/status_macros.h"
+#include "common/image/decode.h"
+#include "common/image/encode.h"
+#include "common/image/resize.h"
+#include "coordinator/rest/json.h"
+#include "coordinator/rest/routes.h"
+
+namespace meshwright {
+namespace {
+
+constexpr int64_t kMaxPartBytes = int64_t{256} << 20;
+constexpr int64_t kMaxFileBytes = int64_t{1} << 40;
+constexpr int kJpegQuality = 85;
+constexpr char kOffsetHeader[] = "Upload-Offset";
+
+nlohmann::ordered_json FileJson(const SceneFileState& file) {
+  return {{"path", file.path},
+          {"sizeBytes", absl::StrCat(file.size_bytes)},
+          {"sha256", file.sha256},
+          {"offsetBytes", absl::StrCat(file.offset_bytes)},
+          {"complete", file.complete}};
+}
+
+absl::Status Answer(RestCall& call, const SceneFileState& file) {
+  call.response.set_header(kOffsetHeader, absl::StrCat(file.offset_bytes));
+  call.response.status = 200;
+  call.response.set_content(Dump(FileJson(file)), kJsonType);
+  return absl::OkStatus();
+}
+
+absl::Status ListFiles(const RestContext& context, RestCall& call) {
+  MW_ASSIGN_OR_RETURN(const std::vector<SceneFileState> files, context.uploads->List(call.path.at("id")));
+  nlohmann::ordered_json response;
+  response["files"] = nlohmann::ordered_json::array();
+  for (const SceneFileState& file : files) response["files"].push_back(FileJson(file));
+  call.response.set_content(Dump(response), kJsonType);
+  return absl::OkStatus();
+}
+
+absl::Status GetFile(const RestContext& context, RestCall& call) {
+  MW_ASSIGN_OR_RETURN(const SceneFileState file, context.uploads->Get(call.path.at("id"), call.path.at("path")));
+  return Answer(call, file);
+}
+
+absl::Status PutFile(const RestContext& context, RestCall& call) {
+  SceneFilePart part = {.path = call.path.at("path")};
+  MW_ASSIGN_OR_RETURN(part.size_bytes, QueryNumber(call, "size", 0, kMaxFileBytes, -1));
+  if (part.size_bytes < 0) return absl::InvalidArgumentError("size_bytes is missing: the parameter size is expected");
+  MW_ASSIGN_OR_RETURN(part.offset_bytes, QueryNumber(call, "offset", 0, kMaxFileBytes, 0));
+  part.sha256 = call.request.get_param_value("sha256");
+  part.part_sha256 = call.request.get_param_value("partSha256");
+  int64_t expected_offset = -1;
+  const auto read = [&](const SceneUploads::Take& take) { return ReadContent(call, kMaxPartBytes, take); };
+  const absl::StatusOr<SceneFileState> file = context.uploads->Put(call.path.at("id"), part, read, &expected_offset);
+  if (!file.ok() && expected_offset >= 0) call.response.set_header(kOffsetHeader, absl::StrCat(expected_offset));
+  MW_RETURN_IF_ERROR(file.status());
+  return Answer(call, *file);
+}
+
+absl::Status Photo(const RestContext& context, RestCall& call) {
+  MW_ASSIGN_OR_RETURN(const int64_t width, QueryNumber(call, "width", 16, 2048, 640));
+  MW_ASSIGN_OR_RETURN(const int64_t camera, PathNumber(call, "camera", 0, std::numeric_limits<int32_t>::max()));
+  MW_ASSIGN_OR_RETURN(const Scene scene, context.reconstructions->LoadScene(call.path.at("id")));
+  if (static_cast<size_t>(camera) >= scene.views.size()) {
+    return absl::NotFoundError(absl::StrCat("camera is ", camera, ", expected 0..", scene.views.size() - 1));
+  }
+  const SceneView& view = scene.views[static_cast<size_t>(camera)];
+  const std::string& digest = view.image_path;
+  return SendForever(call, absl::StrCat(digest, "-", width), "image/jpeg", [&]() -> absl::StatusOr<std::string> {
+    MW_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->Get(digest));
+    MW_ASSIGN_OR_RETURN(const ColorImage image, DecodeImageBytes(bytes, view.name));
+    const int columns = std::min(static_cast<int>(width), image.width);
+    const auto rows = static_cast<int>(int64_t{image.height} * columns / image.width);
+    return EncodeJpeg(ReduceByArea(image, columns, std::max(1, rows)), kJpegQuality);
+  });
+}
+
+}  // namespace
+
+void AddSceneRoutes(const RestContext& context, std::vector<Route>& routes) {
+  const auto add = [&](const char* method, const char* path, std::vector<std::string> query, auto handler) {
+    routes.push_back({method, path, std::move(query),
+                      [&context, handler](RestCall& call) -> absl::Status { return handler(context, call); }});
+  };
+  add("GET", "/v1/reconstructions/{id}/files", {}, ListFiles);
+  add("GET", "/v1/reconstructions/{id}/files/{path}", {}, GetFile);
+  add("PUT", "/v1/reconstructions/{id}/files/{path}", {"size", "sha256", "offset", "partSha256"}, PutFile);
+  add("GET", "/v1/reconstructions/{id}/cameras/{camera}/photo", {"width"}, Photo);
+}
+
+}  // namespace meshwright
