@@ -198,7 +198,7 @@ class RealGrpcServer final : public GrpcServer {
         worker_shell_(workers, blobs) {}
   ~RealGrpcServer() override { Shutdown(absl::Seconds(1)); }
 
-  absl::Status Listen(const std::string& address) {
+  absl::Status Listen(const std::string& address, GrpcServer::Interceptors interceptors) {
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
@@ -207,6 +207,7 @@ class RealGrpcServer final : public GrpcServer {
     builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
     builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5000);
     builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+    if (!interceptors.empty()) builder.experimental().SetInterceptorCreators(std::move(interceptors));
     builder.RegisterService(&reconstruction_shell_);
     builder.RegisterService(&worker_shell_);
     server_ = builder.BuildAndStart();
@@ -240,9 +241,10 @@ class RealGrpcServer final : public GrpcServer {
 
 absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const std::string& address,
                                                               ReconstructionLogic& reconstructions,
-                                                              WorkerLogic& workers, BlobStore& blobs) {
+                                                              WorkerLogic& workers, BlobStore& blobs,
+                                                              Interceptors interceptors) {
   auto server = std::make_unique<RealGrpcServer>(reconstructions, workers, blobs);
-  MW_RETURN_IF_ERROR(server->Listen(address));
+  MW_RETURN_IF_ERROR(server->Listen(address, std::move(interceptors)));
   return server;
 }
 

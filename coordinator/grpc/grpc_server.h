@@ -2,9 +2,11 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <absl/status/statusor.h>
 #include <absl/time/time.h>
+#include <grpcpp/support/server_interceptor.h>
 
 #include "common/blob/blob_store.h"
 #include "coordinator/api/reconstruction_logic.h"
@@ -15,10 +17,12 @@ namespace meshwright {
 // ReconstructionService, WorkerService, health and reflection on one port: a thin shell over the logic.
 class GrpcServer {
  public:
+  using Interceptors = std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>>;
+
   // `address`: "host:port"; port 0 takes a free one. All of it outlives the server.
   static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(const std::string& address,
                                                            ReconstructionLogic& reconstructions, WorkerLogic& workers,
-                                                           BlobStore& blobs);
+                                                           BlobStore& blobs, Interceptors interceptors = {});
   virtual ~GrpcServer() = default;
   virtual int port() const = 0;
   // Answers what waits, then ends calls that last longer than `deadline`.

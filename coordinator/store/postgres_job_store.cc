@@ -155,11 +155,13 @@ class PostgresDatabase : public SqlDatabase {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<JobStore>> OpenPostgresJobStore(const std::string& url, const PostgresOptions& options) {
+absl::StatusOr<std::unique_ptr<JobStore>> OpenPostgresJobStore(const std::string& url, const PostgresOptions& options,
+                                                               const WrapSqlDatabase& wrap) {
   MW_ASSIGN_OR_RETURN(std::string description, DescribePostgresUrl(url));
   auto database = std::make_unique<PostgresDatabase>(url, std::move(description), options);
   MW_RETURN_IF_ERROR(database->Migrate());
-  return std::make_unique<SqlJobStore>(std::move(database));
+  if (!wrap) return std::make_unique<SqlJobStore>(std::move(database));
+  return std::make_unique<SqlJobStore>(wrap(std::move(database)));
 }
 
 }  // namespace meshwright

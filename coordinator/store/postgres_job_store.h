@@ -7,6 +7,7 @@
 #include <absl/time/time.h>
 
 #include "coordinator/store/job_store.h"
+#include "coordinator/store/sql_database.h"
 
 namespace meshwright {
 
@@ -21,6 +22,7 @@ struct PostgresOptions {
 // them up to date. A call whose connection breaks is repeated over a new one, so it may have taken effect before: what
 // CreateReconstruction calls AlreadyExists may be its own, and a lease that was granted to nobody runs out.
 absl::StatusOr<std::unique_ptr<JobStore>> OpenPostgresJobStore(const std::string& url,
-                                                               const PostgresOptions& options = {});
+                                                               const PostgresOptions& options = {},
+                                                               const WrapSqlDatabase& wrap = nullptr);
 
 }  // namespace meshwright

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -51,6 +53,9 @@ class SqlDatabase {
   virtual absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>& calls) = 0;
   virtual absl::StatusOr<absl::Time> Now() = 0;
 };
+
+// Puts another database around the one that a store was opened with, for instance to measure it.
+using WrapSqlDatabase = std::function<std::unique_ptr<SqlDatabase>(std::unique_ptr<SqlDatabase>)>;
 
 // Cuts files of "-- name: x" sections into name -> SQL.
 std::map<std::string, std::string> ParseSqlStatements(const std::vector<std::pair<std::string, std::string>>& files);

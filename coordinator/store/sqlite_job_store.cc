@@ -72,11 +72,14 @@ class SqliteDatabase : public SqlDatabase {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<JobStore>> OpenSqliteJobStore(const std::string& path, const Clock* clock) {
+absl::StatusOr<std::unique_ptr<JobStore>> OpenSqliteJobStore(const std::string& path, const Clock* clock,
+                                                             const WrapSqlDatabase& wrap) {
   static const RealClock real_clock;
   MW_ASSIGN_OR_RETURN(SqliteConnection connection, SqliteConnection::Open(path));
-  return std::make_unique<SqlJobStore>(
-      std::make_unique<SqliteDatabase>(std::move(connection), clock == nullptr ? &real_clock : clock));
+  std::unique_ptr<SqlDatabase> database =
+      std::make_unique<SqliteDatabase>(std::move(connection), clock == nullptr ? &real_clock : clock);
+  if (wrap) database = wrap(std::move(database));
+  return std::make_unique<SqlJobStore>(std::move(database));
 }
 
 }  // namespace meshwright

@@ -126,3 +126,16 @@ SELECT id, cores, memory_bytes, last_heartbeat, drained FROM workers ORDER BY id
 
 -- name: remove_worker
 DELETE FROM workers WHERE id = :worker;
+
+-- name: count_assigned_camera_jobs
+SELECT count(*) FROM camera_jobs AS j JOIN reconstructions AS r ON r.id = j.reconstruction_id
+WHERE j.state = 'assigned' AND r.state = 'running';
+
+-- name: count_reconstructions
+SELECT state, count(*) FROM reconstructions GROUP BY state;
+
+-- name: oldest_progress
+SELECT min(progress.at)
+FROM (SELECT coalesce((SELECT c.committed_at FROM commits AS c WHERE c.reconstruction_id = r.id
+                       ORDER BY c.sequence DESC LIMIT 1), r.created_at) AS at
+      FROM reconstructions AS r WHERE r.state = 'running') AS progress;

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+#include <absl/time/time.h>
+
+#include "common/telemetry/metrics.h"
+#include "coordinator/store/sql_database.h"
+
+namespace meshwright {
+
+// Another SqlDatabase, measured: meshwright_store_seconds{operation}, meshwright_store_errors_total{operation, code},
+// and what the statements that changed something mean: leases by how they began and ended, cameras, commits.
+class MeasuredSqlDatabase final : public SqlDatabase {
+ public:
+  // `metrics` outlives it.
+  MeasuredSqlDatabase(std::unique_ptr<SqlDatabase> database, Metrics& metrics);
+
+  absl::StatusOr<SqlResult> Run(const std::string& statement, const SqlParameters& parameters) override;
+  absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>& calls) override;
+  absl::StatusOr<absl::Time> Now() override { return database_->Now(); }
+
+ private:
+  void CountChanges(const std::string& statement, const SqlParameters& parameters, int64_t rows, int64_t changed);
+
+  const std::unique_ptr<SqlDatabase> database_;
+  Metrics& metrics_;
+  CallMetrics calls_;
+};
+
+}  // namespace meshwright

@@ -1,0 +1,162 @@
+#include "coordinator/telemetry/measured_sql_database.h"
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "coordinator/store/sqlite_job_store.h"
+#include "coordinator/telemetry/cluster_gauges.h"
+
+namespace meshwright {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+// A real store, so that what is counted is what its statements are called and mean.
+class MeasuredStoreTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = testing::TempDir() + "measured_store_" + test->name();
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    auto store = OpenSqliteJobStore(folder_ + "/state.sqlite", &clock_, [this](std::unique_ptr<SqlDatabase> database) {
+      auto measured = std::make_unique<MeasuredSqlDatabase>(std::move(database), metrics_);
+      database_ = measured.get();
+      return measured;
+    });
+    ASSERT_TRUE(store.ok()) << store.status();
+    store_ = *std::move(store);
+    AddClusterGauges(metrics_, *database_, workers_, folder_);
+    ASSERT_TRUE(store_
+                    ->CreateReconstruction({.id = "r", .options_json = "{}", .scene_digest = std::string(64, 'a')},
+                                           clock_.Now())
+                    .ok());
+  }
+  void Assign(SequenceNumber sequence) {
+    ASSERT_TRUE(store_->AssignCameraJob("r", sequence, sequence, sequence - 1, clock_.Now()).ok());
+  }
+  CameraLease Lease() {
+    const auto leases =
+        store_->LeaseCameraJobs({.worker = "w", .expires_at = clock_.Now() + absl::Seconds(10), .now = clock_.Now()});
+    return leases->at(0);
+  }
+  void ExpectLine(const std::string& line) { EXPECT_THAT(metrics_.Text(), HasSubstr("\n" + line + "\n")); }
+
+  std::string folder_;
+  ManualClock clock_;
+  WorkerLogic workers_{LeaseOptions(), clock_};
+  Metrics metrics_{"coordinator"};
+  SqlDatabase* database_ = nullptr;
+  std::unique_ptr<JobStore> store_;
+};
+
+TEST_F(MeasuredStoreTest, LeasesAreCountedByHowTheyEnd) {
+  Assign(1);
+  const auto later = [&] { return CameraJobFailure{.reason = "x", .retry_at = clock_.Now()}; };
+  CameraLease lease = Lease();
+  ASSERT_TRUE(store_->RenewLease("r", 1, lease.job.epoch, "w", clock_.Now() + absl::Seconds(9), clock_.Now()).ok());
+  ASSERT_TRUE(store_->ReleaseLease("r", 1, lease.job.epoch, "w", clock_.Now()).ok());
+  lease = Lease();
+  ASSERT_TRUE(store_->FailLease("r", 1, lease.job.epoch, "w", later(), clock_.Now()).ok());
+  ASSERT_TRUE(store_->FailLease("r", 1, lease.job.epoch, "w", later(), clock_.Now()).ok());  // a repetition
+  lease = Lease();
+  clock_.Advance(absl::Minutes(1));
+  ASSERT_TRUE(store_->ExpireLease("r", 1, lease.job.epoch, later(), clock_.Now()).ok());
+  lease = Lease();
+  ASSERT_TRUE(store_->CompleteCameraJob("r", 1, lease.job.epoch, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
+  ExpectLine("meshwright_leases_granted_total 4");
+  ExpectLine("meshwright_leases_renewed_total 1");
+  for (const char* const outcome : {"finished", "failed", "given_back", "lost"}) {
+    ExpectLine(std::string("meshwright_leases_ended_total{outcome=\"") + outcome + "\"} 1");
+  }
+  ExpectLine("meshwright_store_seconds_count{operation=\"lease_camera_jobs\"} 4");
+  EXPECT_THAT(metrics_.Text(), Not(HasSubstr("meshwright_store_errors_total{")));
+}
+
+TEST_F(MeasuredStoreTest, CommitsBringAcceptedRaysAlsoInTransactions) {
+  for (const SequenceNumber sequence : {1, 2}) {
+    Assign(sequence);
+    ASSERT_TRUE(store_->CompleteCameraJob("r", sequence, 1, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
+  }
+  Assign(3);
+  ASSERT_TRUE(store_->SetCameraJobAside("r", 3, 1, "failed too often", clock_.Now()).ok());
+  const std::string accepted(64, 'c');
+  const auto commit = [&](SequenceNumber sequence, int64_t patches) {
+    return Commit{.sequence = sequence,
+                  .camera = sequence,
+                  .accepted_digest = patches > 0 ? accepted : "",
+                  .filtered_patches = patches,
+                  .accepted_patches = patches};
+  };
+  ASSERT_TRUE(store_->AddCommit("r", commit(1, 100), clock_.Now()).ok());
+  ASSERT_TRUE(store_->AddCommit("r", commit(1, 100), clock_.Now()).ok());  // a repetition
+  ASSERT_TRUE(
+      store_->Advance("r", {commit(2, 20), commit(3, 0)}, {{.sequence = 4, .camera = 4, .snapshot = 3}}, clock_.Now())
+          .ok());
+  ExpectLine("meshwright_commits_total 3");
+  ExpectLine("meshwright_rays_accepted_total 120");
+  ExpectLine("meshwright_cameras_set_aside_total 1");
+  ExpectLine("meshwright_jobs_waiting 1");
+}
+
+TEST_F(MeasuredStoreTest, GaugesFollowTheStore) {
+  ExpectLine("meshwright_jobs_waiting 0");
+  ExpectLine("meshwright_reconstructions{state=\"running\"} 1");
+  Assign(1);
+  Assign(2);
+  clock_.Advance(absl::Seconds(90));
+  ExpectLine("meshwright_jobs_waiting 2");
+  ExpectLine("meshwright_longest_without_commit_seconds 90");
+  ASSERT_TRUE(store_->CompleteCameraJob("r", 1, 1, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
+  ExpectLine("meshwright_jobs_waiting 1");
+  ASSERT_TRUE(store_->AddCommit("r", {.sequence = 1, .camera = 1}, clock_.Now()).ok());
+  ExpectLine("meshwright_longest_without_commit_seconds 0");
+  // Jobs of what does not run are no queue.
+  ASSERT_TRUE(store_->SetReconstructionState("r", ReconstructionState::kCancelled).ok());
+  ExpectLine("meshwright_jobs_waiting 0");
+  ExpectLine("meshwright_reconstructions{state=\"cancelled\"} 1");
+  ExpectLine("meshwright_reconstructions{state=\"running\"} 0");
+}
+
+TEST_F(MeasuredStoreTest, WorkersAndTheDiskAreSeen) {
+  v1::SynchronizeRequest request;
+  request.set_worker_id("w");
+  request.set_instance("i");
+  request.set_cores(3);
+  request.set_memory_bytes(1 << 30);
+  ASSERT_TRUE(workers_.Synchronize(request, [] { return false; }).ok());
+  ExpectLine("meshwright_workers 1");
+  ExpectLine("meshwright_workers_cores 3");
+  ExpectLine("meshwright_workers_draining 0");
+  EXPECT_THAT(metrics_.Text(), testing::ContainsRegex("\nmeshwright_data_disk_free_bytes [1-9]"));
+}
+
+// Answers everything with an error.
+class BrokenDatabase final : public SqlDatabase {
+ public:
+  absl::StatusOr<SqlResult> Run(const std::string&, const SqlParameters&) override {
+    return absl::UnavailableError("gone");
+  }
+  absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>&) override { return absl::UnavailableError("gone"); }
+  absl::StatusOr<absl::Time> Now() override { return absl::UnavailableError("gone"); }
+};
+
+TEST(MeasuredSqlDatabaseTest, ErrorsAreCountedAndChangeNothingElse) {
+  Metrics metrics("coordinator");
+  MeasuredSqlDatabase database(std::make_unique<BrokenDatabase>(), metrics);
+  EXPECT_FALSE(database.Run("add_commit", {{"accepted_patches", int64_t{5}}}).ok());
+  EXPECT_FALSE(database.RunTogether({{"add_commit", {{"accepted_patches", int64_t{5}}}}}).ok());
+  const std::string text = metrics.Text();
+  EXPECT_THAT(text, HasSubstr("meshwright_store_errors_total{code=\"unavailable\",operation=\"add_commit\"} 1\n"));
+  EXPECT_THAT(text, HasSubstr("meshwright_store_errors_total{code=\"unavailable\",operation=\"transaction\"} 1\n"));
+  EXPECT_THAT(text, HasSubstr("meshwright_commits_total 0\n"));
+  EXPECT_THAT(text, HasSubstr("meshwright_rays_accepted_total 0\n"));
+}
+
+}  // namespace
+}  // namespace meshwright
