@@ -1,0 +1,133 @@
+// What the coordinator's REST API says (coordinator/rest/openapi.yaml), as far as the page reads it. 64-bit integers
+// are strings there.
+
+export type ReconstructionState = 'CREATED' | 'PREPARING' | 'RUNNING' | 'JOINING' | 'DONE' | 'FAILED' | 'CANCELLED';
+
+export interface Progress {
+  camerasTotal?: number;
+  camerasCommitted?: number;
+  camerasSetAside?: number;
+  camerasInFlight?: number;
+  jobsLeased?: number;
+  patchesFiltered?: string;
+  patchesAccepted?: string;
+  vertices?: string;
+  faces?: string;
+}
+
+export interface Reconstruction {
+  id: string;
+  state: `RECONSTRUCTION_STATE_${ReconstructionState}`;
+  failure?: string;
+  optionsJson?: string;
+  sceneReference?: string;
+  weight?: number;
+  createTime?: string;
+  finishTime?: string;
+  progress?: Progress;
+  meshBytes?: string;
+  meshSha256?: string;
+}
+
+// Positions are the numbers in CameraTable.states.
+export const CAMERA_STATES = ['WAITING', 'ASSIGNED', 'DONE', 'COMMITTED', 'SET_ASIDE'] as const;
+export type CameraState = (typeof CAMERA_STATES)[number];
+
+export interface Camera {
+  index: number;
+  name: string;
+  state: `CAMERA_STATE_${CameraState}`;
+  sequence: number;
+  filteredPatches?: string;
+  acceptedPatches?: string;
+  setAsideReason?: string;
+  reportJson?: string;
+  geometry: {
+    width: number;
+    height: number;
+    fx: number;
+    fy: number;
+    cx: number;
+    cy: number;
+    rotation: number[]; // cam_from_world, by rows
+    translation: number[];
+  };
+  shares?: { coveredBefore?: number; grown?: number; filtered?: number; accepted?: number };
+  seconds?: Record<string, number>;
+  attempts?: number;
+  worker?: string;
+}
+
+export interface Part {
+  sequence: number;
+  camera: number;
+  sha256: string;
+  patches: string;
+}
+
+export const ATTEMPT_OUTCOMES = ['RUNNING', 'FINISHED', 'FAILED', 'LOST', 'GIVEN_BACK'] as const;
+export type AttemptOutcome = (typeof ATTEMPT_OUTCOMES)[number];
+
+export interface Attempt {
+  sequence: number;
+  camera: number;
+  worker: string;
+  startTime: string;
+  endTime?: string;
+  outcome: `ATTEMPT_OUTCOME_${AttemptOutcome}`;
+  reason?: string;
+}
+
+export interface LogEntry {
+  time: string;
+  severity: 'info' | 'warning' | 'error';
+  message: string;
+  camera?: number;
+  worker?: string;
+}
+
+export interface Worker {
+  id: string;
+  cores?: number;
+  memoryBytes?: string;
+  draining?: boolean;
+  jobs?: number;
+  lastSeen?: string;
+  version?: string;
+}
+
+export interface Option {
+  name: string;
+  group: string;
+  type: 'integer' | 'number';
+  default: number;
+  minimum?: number;
+  exclusiveMinimum?: number;
+  maximum?: number;
+  exclusiveMaximum?: number;
+  documentation: string;
+}
+
+export interface SceneFile {
+  path: string;
+  sizeBytes: string;
+  sha256: string;
+  offsetBytes: string;
+  complete: boolean;
+}
+
+export interface Problem {
+  title: string;
+  status: number;
+  detail: string;
+  code?: string;
+  field?: string;
+}
+
+export function stateOf(reconstruction: Reconstruction): ReconstructionState {
+  return reconstruction.state.replace('RECONSTRUCTION_STATE_', '') as ReconstructionState;
+}
+
+export function isOver(state: ReconstructionState): boolean {
+  return state === 'DONE' || state === 'FAILED' || state === 'CANCELLED';
+}

@@ -1,0 +1,196 @@
+// The mesh in 3D as it grows, and what can be done with the view.
+import { useSignalEffect } from '@preact/signals';
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { reconstructionUrl } from '../api/client';
+import { CAMERA_STATES, isOver, stateOf } from '../api/types';
+import { count } from '../format';
+import type { ReconstructionStore } from '../state/reconstruction_store';
+import { cssColor, theme } from '../theme';
+import type { Coloring } from '../view3d/part_batch';
+import { PartLoader } from '../view3d/part_loader';
+import type { SceneViewer } from '../view3d/scene_viewer';
+import { Notice, Segmented } from './pieces';
+
+const COLORINGS = [
+  ['photo', 'Photographs'],
+  ['camera', 'Cameras'],
+  ['plain', 'Shape'],
+] as const;
+
+const STATE_WORDS = ['waiting', 'under way', 'processed', 'committed', 'set aside'] as const;
+
+// A phone has less memory, and fewer pixels to see them with.
+const FACE_BUDGET = window.matchMedia('(max-width: 700px), (pointer: coarse)').matches ? 400_000 : 1_500_000;
+
+interface Props {
+  store: ReconstructionStore;
+  selected: number;
+  onSelect: (camera: number) => void;
+}
+
+export function ViewerPanel({ store, selected, onSelect }: Props) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const frame = useRef<HTMLDivElement>(null);
+  const [viewer, setViewer] = useState<SceneViewer | null>(null);
+  const [loader, setLoader] = useState<PartLoader | null>(null);
+  const [failure, setFailure] = useState('');
+  const rest = useRef(() => {});
+  const [coloring, setColoring] = useState<Coloring>('photo');
+  const [frusta, setFrusta] = useState(true);
+  const [numbers, setNumbers] = useState({ parts: 0, faces: 0, shown: 0 });
+
+  useEffect(() => {
+    let closed = false;
+    let close = () => {};
+    // three.js is large; the rest of the page does not wait for it.
+    void import('../view3d/scene_viewer').then(({ SceneViewer }) => {
+      if (closed) return;
+      try {
+        close = open(new SceneViewer(canvas.current!, { onPick: onSelect, onRest: () => rest.current() }));
+      } catch {
+        setFailure('This browser does not offer WebGL 2; everything but the 3D view works.');
+      }
+    });
+    return () => {
+      closed = true;
+      close();
+    };
+  }, [store]);
+
+  const open = (made: SceneViewer) => {
+    const loading = new PartLoader({
+      data: store.data,
+      urlOf: (sequence, maxFaces) => reconstructionUrl(store.id, `/parts/${sequence}/preview?max_faces=${maxFaces}`),
+      budget: FACE_BUDGET,
+      show: (part, geometry) => made.show(part, geometry),
+      importanceOf: (part) => made.importanceOf(part),
+    });
+    rest.current = () => loading.plan();
+    setViewer(made);
+    setLoader(loading);
+    const counting = setInterval(() => {
+      const now = { parts: loading.parts.size, faces: loading.facesOfWhole, shown: made.shownFaces };
+      setNumbers((old) => (old.parts === now.parts && old.faces === now.faces && old.shown === now.shown ? old : now));
+    }, 250);
+    return () => {
+      clearInterval(counting);
+      loading.close();
+      made.dispose();
+    };
+  };
+
+  useSignalEffect(() => {
+    const table = store.cameras.value;
+    if (table !== null) viewer?.setCameras(table);
+  });
+  useSignalEffect(() => {
+    if (store.parts.value.length > 0) loader?.add(store.parts.value);
+  });
+  useEffect(() => {
+    if (viewer === null) return;
+    if (store.cameras.value !== null) viewer.setCameras(store.cameras.value);
+    loader?.add(store.parts.value);
+  }, [viewer, loader]);
+  useEffect(() => viewer?.setBackground(cssColor('--stage')), [viewer, theme.value]);
+  useEffect(() => viewer?.setColoring(coloring), [viewer, coloring]);
+  useEffect(() => viewer?.showFrusta(frusta), [viewer, frusta]);
+  useEffect(() => viewer?.select(selected), [viewer, selected, store.cameras.value]);
+
+  const onKeyDown = (event: KeyboardEvent) => {
+    if (viewer === null || event.ctrlKey || event.metaKey || event.altKey) return;
+    const turn = Math.PI / 24;
+    const moves: Record<string, () => void> = {
+      ArrowLeft: () => viewer.orbit(-turn, 0, 1),
+      ArrowRight: () => viewer.orbit(turn, 0, 1),
+      ArrowUp: () => viewer.orbit(0, -turn, 1),
+      ArrowDown: () => viewer.orbit(0, turn, 1),
+      '+': () => viewer.orbit(0, 0, 0.85),
+      '=': () => viewer.orbit(0, 0, 0.85),
+      '-': () => viewer.orbit(0, 0, 1 / 0.85),
+      f: () => viewer.fit(),
+      c: () => setFrusta((shown) => !shown),
+    };
+    const move = moves[event.key];
+    if (move === undefined) return;
+    event.preventDefault();
+    move();
+  };
+
+  const state = store.reconstruction.value === null ? null : stateOf(store.reconstruction.value);
+  const words =
+    numbers.parts === 0
+      ? state !== null && isOver(state)
+        ? 'Nothing was accepted'
+        : 'No surface is accepted yet'
+      : `${count(numbers.faces)} triangles of ${count(numbers.parts)} cameras` +
+        (numbers.shown < numbers.faces ? `, ${count(numbers.shown)} shown` : '');
+  return (
+    <section class="card stage" ref={frame} aria-label="The mesh in 3D">
+      <canvas
+        ref={canvas}
+        tabIndex={0}
+        role="application"
+        aria-label={`The mesh in 3D: ${words}. Arrow keys turn, plus and minus zoom, F shows everything, C shows or hides cameras.`}
+        onKeyDown={onKeyDown}
+      />
+      {failure !== '' && (
+        <div class="stage-failure">
+          <Notice tone="warning">{failure}</Notice>
+        </div>
+      )}
+      <div class="stage-top">
+        <Segmented label="Colour by" value={coloring} options={COLORINGS} onChange={setColoring} />
+        <div class="stage-buttons">
+          <button
+            class="button small"
+            aria-pressed={frusta}
+            onClick={() => setFrusta(!frusta)}
+            title="Show or hide cameras (C)"
+          >
+            Frusta
+          </button>
+          <button class="button small" onClick={() => viewer?.fit()} title="Show everything (F)">
+            Fit
+          </button>
+          <button
+            class="button small"
+            disabled={selected < 0}
+            onClick={() => viewer?.lookThrough(selected)}
+            title="Look from where the selected camera stood"
+          >
+            Look through
+          </button>
+          <button
+            class="button small wide-only"
+            onClick={() =>
+              document.fullscreenElement ? document.exitFullscreen() : frame.current?.requestFullscreen()
+            }
+          >
+            Full screen
+          </button>
+        </div>
+      </div>
+      <div class="stage-bottom">
+        <output
+          class="stage-numbers"
+          data-parts={numbers.parts}
+          data-faces={numbers.faces}
+          data-shown={numbers.shown}
+          aria-live="off"
+        >
+          {words}
+        </output>
+        {frusta && (
+          <ul class="legend" aria-label="Colours of cameras">
+            {CAMERA_STATES.map((name, i) => (
+              <li key={name}>
+                <span class="dot" style={{ background: `var(--state-${name.toLowerCase().replace('_', '-')})` }} />
+                {STATE_WORDS[i]}
+              </li>
+            ))}
+          </ul>
+        )}
+      </div>
+    </section>
+  );
+}

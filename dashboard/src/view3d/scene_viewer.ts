@@ -1,0 +1,312 @@
+// The mesh and its cameras on a canvas. Draws only when something has changed.
+import {
+  AmbientLight,
+  Box3,
+  Color,
+  ColorManagement,
+  DirectionalLight,
+  LinearSRGBColorSpace,
+  PerspectiveCamera,
+  Quaternion,
+  Scene,
+  Spherical,
+  Vector3,
+  WebGLRenderer,
+} from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { POSE, type CameraTable } from '../api/camera_table';
+import { CameraFrusta } from './camera_frusta';
+import { PartBatch, type Coloring } from './part_batch';
+import type { LoadedPart } from './part_loader';
+import type { PartGeometry } from './preview_decoder';
+
+export interface SceneViewerCallbacks {
+  onPick: (camera: number) => void;
+  // The view has come to rest.
+  onRest: () => void;
+}
+
+// Photographs' colours go to the screen as they are.
+ColorManagement.enabled = false;
+
+const REST_MS = 250;
+// Frames that only show that more has come need not be many; software rendering leaves little time for anything else.
+const MS_BETWEEN_GROWTH_FRAMES = 150;
+// So much of a frame may go into taking up new parts.
+const MS_PER_FRAME = 8;
+
+export class SceneViewer {
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly view = new PerspectiveCamera(45, 1, 0.01, 1000);
+  private controls: OrbitControls;
+  private readonly batch = new PartBatch();
+  private readonly frusta = new CameraFrusta();
+  private readonly light = new DirectionalLight(0xffffff, 1.9);
+  private readonly resizing: ResizeObserver;
+  private readonly up = new Vector3(0, 0, 1);
+  private readonly cameraBox = new Box3();
+  private readonly partBox = new Box3();
+  private queue: { part: LoadedPart; geometry: PartGeometry | null }[] = [];
+  private table: CameraTable | null = null;
+  private frameRequested = 0;
+  private restTimer: ReturnType<typeof setTimeout> | undefined;
+  private growthTimer: ReturnType<typeof setTimeout> | undefined;
+  private movedByHand = false;
+  private fittedRadius = 0;
+  private pressed: { x: number; y: number } | null = null;
+
+  // Throws where there is no WebGL 2.
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly callbacks: SceneViewerCallbacks,
+  ) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.scene.add(this.batch.mesh, this.frusta.lines, new AmbientLight(0xffffff, 1.1), this.light);
+    this.view.up.copy(this.up);
+    this.controls = this.makeControls();
+    canvas.addEventListener('pointerdown', this.press);
+    canvas.addEventListener('pointerup', this.release);
+    this.resizing = new ResizeObserver(() => this.resize());
+    this.resizing.observe(canvas);
+    this.resize();
+  }
+
+  setBackground(color: string) {
+    this.scene.background = new Color(color);
+    this.draw();
+  }
+
+  setColoring(coloring: Coloring) {
+    this.batch.setColoring(coloring);
+    this.draw();
+  }
+
+  showFrusta(shown: boolean) {
+    this.frusta.lines.visible = shown;
+    this.draw();
+  }
+
+  setCameras(table: CameraTable) {
+    const first = this.table === null || this.table.count !== table.count;
+    this.table = table;
+    if (table.count === 0) return;
+    if (first) this.takeUpCameras(table);
+    this.frusta.set(table, this.cameraSpacing(table));
+    if (first) this.fit();
+    this.draw();
+  }
+
+  // Another level of detail of a part, or nothing of it any more.
+  show(part: LoadedPart, geometry: PartGeometry | null) {
+    this.queue.push({ part, geometry });
+    this.growthTimer ??= setTimeout(() => {
+      this.growthTimer = undefined;
+      this.draw();
+    }, MS_BETWEEN_GROWTH_FRAMES);
+  }
+
+  get shownFaces(): number {
+    return this.batch.faces;
+  }
+
+  select(camera: number) {
+    this.frusta.select(camera);
+    this.draw();
+  }
+
+  // Stands behind the camera and looks where it looks.
+  lookThrough(camera: number) {
+    if (this.table === null || camera < 0) return;
+    const pose = this.table.poses.subarray(POSE * camera, POSE * (camera + 1));
+    const forward = new Vector3(pose[2], pose[5], pose[8]);
+    const center = this.frusta.centerOf(camera);
+    const distance = Math.max(this.boxOfAll().getCenter(new Vector3()).sub(center).dot(forward), this.radius() * 0.2);
+    this.view.position.copy(center).addScaledVector(forward, -0.05 * distance);
+    this.controls.target.copy(center).addScaledVector(forward, distance);
+    this.movedByHand = true;
+    this.controls.update();
+    this.changed();
+  }
+
+  // Everything in view, from where the cameras stand.
+  fit() {
+    const box = this.boxOfAll();
+    if (box.isEmpty()) return;
+    const center = box.getCenter(new Vector3());
+    const radius = this.radius();
+    this.fittedRadius = radius;
+    const direction = this.standpoint().sub(center);
+    if (direction.length() < 0.15 * radius) direction.copy(this.up).addScaledVector(anyNormalTo(this.up), 1.2);
+    direction.normalize().addScaledVector(this.up, 0.35).normalize();
+    const narrow = Math.min(1, this.view.aspect);
+    const distance = (0.9 * radius) / (Math.tan((this.view.fov * Math.PI) / 360) * narrow);
+    this.view.position.copy(center).addScaledVector(direction, distance);
+    this.controls.target.copy(center);
+    this.controls.update();
+    this.movedByHand = false;
+    this.changed();
+  }
+
+  // Angles in radians; `zoom` multiplies the distance.
+  orbit(azimuth: number, polar: number, zoom: number) {
+    const offset = this.view.position.clone().sub(this.controls.target);
+    const toY = new Vector3(0, 1, 0);
+    const turned = offset.clone().applyQuaternion(quaternionBetween(this.up, toY));
+    const spherical = new Spherical().setFromVector3(turned);
+    spherical.theta += azimuth;
+    spherical.phi = Math.min(Math.max(spherical.phi + polar, 0.02), Math.PI - 0.02);
+    spherical.radius *= zoom;
+    offset.setFromSpherical(spherical).applyQuaternion(quaternionBetween(toY, this.up));
+    this.view.position.copy(this.controls.target).add(offset);
+    this.movedByHand = true;
+    this.controls.update();
+    this.changed();
+  }
+
+  // The share of the view's height that the part fills, squared; far less when it is not in view.
+  importanceOf(part: LoadedPart): number {
+    const center = new Vector3(...part.center!);
+    const distance = Math.max(center.distanceTo(this.view.position) - part.radius, part.radius * 0.1, 1e-9);
+    const size = Math.min(part.radius / distance, 4);
+    center.project(this.view);
+    const margin = 1 + size;
+    const inView = Math.abs(center.x) < margin && Math.abs(center.y) < margin && center.z < 1;
+    return size * size * (inView ? 1 : 0.05);
+  }
+
+  dispose() {
+    cancelAnimationFrame(this.frameRequested);
+    clearTimeout(this.restTimer);
+    clearTimeout(this.growthTimer);
+    this.resizing.disconnect();
+    this.canvas.removeEventListener('pointerdown', this.press);
+    this.canvas.removeEventListener('pointerup', this.release);
+    this.controls.dispose();
+    this.batch.dispose();
+    this.frusta.dispose();
+    this.renderer.dispose();
+  }
+
+  private readonly press = (event: PointerEvent) => (this.pressed = { x: event.offsetX, y: event.offsetY });
+
+  private readonly release = (event: PointerEvent) => {
+    const { pressed } = this;
+    this.pressed = null;
+    if (pressed === null || Math.hypot(event.offsetX - pressed.x, event.offsetY - pressed.y) > 4) return;
+    if (!this.frusta.lines.visible) return;
+    const { clientWidth, clientHeight } = this.canvas;
+    const camera = this.frusta.pick(event.offsetX, event.offsetY, clientWidth, clientHeight, this.view);
+    if (camera >= 0) this.callbacks.onPick(camera);
+  };
+
+  private makeControls(): OrbitControls {
+    const controls = new OrbitControls(this.view, this.canvas);
+    controls.addEventListener('start', () => (this.movedByHand = true));
+    controls.addEventListener('change', () => this.changed());
+    return controls;
+  }
+
+  private changed() {
+    this.draw();
+    clearTimeout(this.restTimer);
+    this.restTimer = setTimeout(() => this.callbacks.onRest(), REST_MS);
+  }
+
+  private draw() {
+    if (this.frameRequested !== 0) return;
+    this.frameRequested = requestAnimationFrame(() => {
+      this.frameRequested = 0;
+      this.takeUpParts();
+      this.light.position.copy(this.view.position).addScaledVector(this.up, this.radius() * 0.3);
+      this.light.target.position.copy(this.controls.target);
+      this.light.target.updateMatrixWorld();
+      this.placeClippingPlanes();
+      this.renderer.render(this.scene, this.view);
+      if (this.queue.length > 0) this.draw();
+    });
+  }
+
+  private takeUpParts() {
+    const until = performance.now() + MS_PER_FRAME;
+    let taken = 0;
+    while (taken < this.queue.length && (taken === 0 || performance.now() < until)) {
+      const { part, geometry } = this.queue[taken++]!;
+      if (geometry === null) {
+        this.batch.remove(part.sequence);
+        continue;
+      }
+      this.batch.put(part.sequence, part.camera, geometry);
+      if (geometry.indices.length === 0) continue;
+      this.partBox.expandByPoint(new Vector3(...geometry.min)).expandByPoint(new Vector3(...geometry.max));
+    }
+    this.queue.splice(0, taken);
+    // What grows stays in view until somebody looks elsewhere.
+    if (!this.movedByHand && this.radius() > 1.1 * this.fittedRadius) this.fit();
+  }
+
+  private takeUpCameras(table: CameraTable) {
+    this.cameraBox.makeEmpty();
+    const up = new Vector3();
+    for (let i = 0; i < table.count; ++i) {
+      const pose = table.poses.subarray(POSE * i, POSE * (i + 1));
+      this.cameraBox.expandByPoint(new Vector3(pose[9], pose[10], pose[11]));
+      up.sub(new Vector3(pose[1], pose[4], pose[7])); // Y of a camera points down
+    }
+    this.up.copy(up.length() > 0.05 * table.count ? up.normalize() : new Vector3(0, 0, 1));
+    this.view.up.copy(this.up);
+    // They read the up direction once, when they are made.
+    this.controls.dispose();
+    this.controls = this.makeControls();
+  }
+
+  // Pyramids as large as the gaps between cameras let them be.
+  private cameraSpacing(table: CameraTable): number {
+    const size = this.cameraBox.getSize(new Vector3());
+    const sides = [size.x, size.y, size.z].sort((a, b) => b - a);
+    const area = Math.max(sides[0]! * Math.max(sides[1]!, sides[0]! * 0.1), 1e-12);
+    return 0.45 * Math.sqrt(area / Math.max(table.count, 1));
+  }
+
+  private boxOfAll(): Box3 {
+    return this.cameraBox.clone().union(this.partBox);
+  }
+
+  private radius(): number {
+    const box = this.boxOfAll();
+    return box.isEmpty() ? 1e-6 : Math.max(box.getSize(new Vector3()).length() / 2, 1e-6);
+  }
+
+  private standpoint(): Vector3 {
+    return this.cameraBox.isEmpty() ? new Vector3() : this.cameraBox.getCenter(new Vector3());
+  }
+
+  private placeClippingPlanes() {
+    const box = this.boxOfAll();
+    if (box.isEmpty()) return;
+    const far = box.getCenter(new Vector3()).distanceTo(this.view.position) + box.getSize(new Vector3()).length();
+    this.view.far = far;
+    this.view.near = Math.max(far / 20_000, Math.min(box.distanceToPoint(this.view.position) * 0.5, far / 10));
+    this.view.updateProjectionMatrix();
+  }
+
+  private resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.view.aspect = width / height;
+    this.view.updateProjectionMatrix();
+    this.draw();
+  }
+}
+
+function quaternionBetween(from: Vector3, to: Vector3): Quaternion {
+  return new Quaternion().setFromUnitVectors(from, to);
+}
+
+function anyNormalTo(axis: Vector3): Vector3 {
+  const other = Math.abs(axis.x) < 0.9 ? new Vector3(1, 0, 0) : new Vector3(0, 1, 0);
+  return other.cross(axis).normalize();
+}
