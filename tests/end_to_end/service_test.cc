@@ -1,71 +1,23 @@
 // The service as real processes: a coordinator, two workers and the command line's client. What they make has the bytes
 // that one process makes, also when a worker is killed.
 
-#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
-#include "common/base/check.h"
+#include "tests/end_to_end/background_program.h"
 #include "tests/end_to_end/program.h"
 
 namespace meshwright::end_to_end {
 namespace {
 
 const std::vector<std::string> kQuickOptions = {"--max-image-size", "240"};
-
-// A program in the background; killed when it goes out of scope.
-class BackgroundProgram {
- public:
-  BackgroundProgram(const std::string& program, const std::vector<std::string>& arguments, const std::string& log)
-      : child_(::fork()) {
-    MW_CHECK(child_ >= 0);
-    if (child_ > 0) return;
-    const int descriptor = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
-    ::dup2(descriptor, STDOUT_FILENO);
-    ::dup2(descriptor, STDERR_FILENO);
-    std::vector<char*> argv = {const_cast<char*>(program.c_str())};
-    for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-    argv.push_back(nullptr);
-    ::execv(argv[0], argv.data());
-    ::_exit(127);
-  }
-  ~BackgroundProgram() { Stop(SIGKILL); }
-  BackgroundProgram(const BackgroundProgram&) = delete;
-  BackgroundProgram& operator=(const BackgroundProgram&) = delete;
-
-  // The wait status; -1 when it ended before.
-  int Stop(int signal) {
-    if (child_ < 0) return -1;
-    ::kill(child_, signal);
-    int status = -1;
-    ::waitpid(child_, &status, 0);
-    child_ = -1;
-    return status;
-  }
-
- private:
-  pid_t child_;
-};
-
-template <typename Condition>
-bool WaitUntil(const Condition& condition, double seconds) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  return true;
-}
 
 std::vector<std::string> With(std::vector<std::string> arguments, const std::vector<std::string>& more) {
   arguments.insert(arguments.end(), more.begin(), more.end());
@@ -81,11 +33,7 @@ class ServiceTest : public testing::Test {
         MESHWRIGHT_COORDINATOR,
         std::vector<std::string>{"--data", folder_ / "data", "--listen", "127.0.0.1:" + port_, "--lease-seconds", "2"},
         log);
-    const std::string said = "listening on port ";
-    ASSERT_TRUE(WaitUntil([&] { return ReadBytes(log).find('\n') != std::string::npos; }, 30));
-    const std::string line = ReadBytes(log);
-    ASSERT_THAT(line, testing::StartsWith(said));
-    port_ = line.substr(said.size(), line.find('\n') - said.size());
+    port_ = ListeningPort(log);
   }
   std::unique_ptr<BackgroundProgram> StartWorker(const std::string& id) {
     return std::make_unique<BackgroundProgram>(

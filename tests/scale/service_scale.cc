@@ -1,0 +1,175 @@
+// The service without photographs: many reconstructions of a flat wall, many workers whose camera jobs only sleep, a
+// coordinator as a process of its own, PostgreSQL or SQLite. Prints what it measured as JSON. See docs/benchmarks.md.
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/time/clock.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/service/service_client.h"
+#include "common/base/check.h"
+#include "common/blob/filesystem_blob_store.h"
+#include "coordinator/store/postgres_testing.h"
+#include "tests/end_to_end/background_program.h"
+#include "tests/end_to_end/program.h"
+#include "tests/scale/fake_worker.h"
+#include "tests/scale/wall_world.h"
+#include "worker/agent/grpc_coordinator.h"
+
+namespace meshwright::scale {
+namespace {
+
+struct Settings {
+  std::string coordinator_program;
+  std::string store = "postgres";
+  int cameras = 10000;
+  int reconstructions = 1;
+  int small_cameras = 100;  // of all reconstructions but the first
+  int workers = 200;
+  int job_ms = 300;
+  int window = 400;
+};
+
+double PeakMebibytes(pid_t process) {
+  std::ifstream status(absl::StrCat("/proc/", process, "/status"));
+  for (std::string line; std::getline(status, line);) {
+    if (absl::StartsWith(line.c_str(), "VmHWM:")) return std::stod(line.substr(6)) / 1024;
+  }
+  return 0;
+}
+
+double Percentile(std::vector<double>& values, double share) {
+  if (values.empty()) return 0;
+  const auto place = values.begin() + static_cast<int64_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+int Measure(const Settings& settings) {
+  const end_to_end::TemporaryFolder folder;
+  WallWorld(settings.cameras).Write(folder / "scenes/large");
+  if (settings.reconstructions > 1) WallWorld(settings.small_cameras).Write(folder / "scenes/small");
+
+  std::unique_ptr<PostgresServer> postgres;
+  std::vector<std::string> arguments = {"--data",       folder / "data",   "--listen",        "127.0.0.1:0",
+                                        "--scene-root", folder / "scenes", "--lease-seconds", "30"};
+  if (settings.store == "postgres") {
+    auto started = PostgresServer::Start(/*durable=*/true);
+    MW_CHECK(started.ok());
+    postgres = *std::move(started);
+    arguments.insert(arguments.end(), {"--store", postgres->url()});
+  }
+  const std::string log = folder / "coordinator.log";
+  end_to_end::BackgroundProgram coordinator(settings.coordinator_program, arguments, log);
+  const std::string address = absl::StrCat("127.0.0.1:", end_to_end::ListeningPort(log));
+
+  const std::unique_ptr<ServiceClient> client = ServiceClient::Connect(address);
+  const auto name_of = [](int i) { return absl::StrCat("wall-", i); };
+  std::map<std::string, double> ended;  // seconds since the first job could run
+  for (int i = 0; i < settings.reconstructions; ++i) {
+    v1::CreateReconstructionRequest request;
+    request.set_id(name_of(i));
+    request.set_scene_reference(i == 0 ? "file:large" : "file:small");
+    request.set_options_json(absl::StrCat(R"({"window": )", settings.window, "}"));
+    MW_CHECK(client->Create(request).ok());
+    const auto begun = client->Start(name_of(i));
+    MW_CHECK(begun.ok());
+  }
+  // The scenes become blobs and pairs before the first job is there; that is not what is measured.
+  for (int i = 0; i < settings.reconstructions; ++i) {
+    while (client->Get(name_of(i))->progress().cameras_total() == 0) absl::SleepFor(absl::Milliseconds(50));
+  }
+
+  const auto blobs = FilesystemBlobStore::Open(folder / "data/blobs");
+  MW_CHECK(blobs.ok());
+  std::vector<std::unique_ptr<GrpcCoordinator>> channels;
+  std::vector<std::unique_ptr<FakeWorker>> workers;
+  for (int i = 0; i < settings.workers; ++i) {
+    channels.push_back(GrpcCoordinator::Connect(address));
+    workers.push_back(std::make_unique<FakeWorker>(absl::StrCat("worker-", i), *channels.back(), **blobs,
+                                                   absl::Milliseconds(settings.job_ms)));
+  }
+  std::vector<FakeWorkerFigures> figures(workers.size());
+  std::vector<std::thread> threads;
+  const absl::Time begun = absl::Now();
+  for (size_t i = 0; i < workers.size(); ++i) {
+    threads.emplace_back([&, i] { figures[i] = workers[i]->Run(); });
+  }
+
+  // Until every camera is committed; joining the meshes is not measured.
+  int64_t committed = 0;
+  while (static_cast<int>(ended.size()) < settings.reconstructions) {
+    committed = 0;
+    for (int i = 0; i < settings.reconstructions; ++i) {
+      const auto now = client->Get(name_of(i));
+      MW_CHECK(now.ok());
+      MW_CHECK(now->state() != v1::RECONSTRUCTION_STATE_FAILED);
+      committed += now->progress().cameras_committed();
+      if (now->progress().cameras_committed() + now->progress().cameras_set_aside() >=
+          now->progress().cameras_total()) {
+        ended.try_emplace(name_of(i), absl::ToDoubleSeconds(absl::Now() - begun));
+      }
+    }
+    absl::SleepFor(absl::Milliseconds(100));
+  }
+  const double elapsed = absl::ToDoubleSeconds(absl::Now() - begun);
+  for (const auto& worker : workers) worker->Stop();
+  for (std::thread& thread : threads) thread.join();
+
+  std::vector<double> answers;
+  double busy = 0;
+  int64_t failed_calls = 0;
+  for (FakeWorkerFigures& one : figures) {
+    answers.insert(answers.end(), one.answer_seconds.begin(), one.answer_seconds.end());
+    busy += one.busy_seconds;
+    failed_calls += one.failed_calls;
+  }
+  nlohmann::ordered_json json;
+  json["cameras_committed"] = committed;
+  json["seconds"] = elapsed;
+  json["camera_jobs_per_second"] = static_cast<double>(committed) / elapsed;
+  json["synchronize_ms"] = {{"median", 1e3 * Percentile(answers, 0.5)},
+                            {"p99", 1e3 * Percentile(answers, 0.99)},
+                            {"max", 1e3 * Percentile(answers, 1)}};
+  json["failed_calls"] = failed_calls;
+  json["idle_share"] = 1 - busy / (elapsed * settings.workers);
+  json["coordinator_peak_mib"] = PeakMebibytes(coordinator.id());
+  std::vector<double> small;
+  for (const auto& [name, seconds] : ended) {
+    if (name != name_of(0)) small.push_back(seconds);
+  }
+  if (!small.empty()) {
+    json["large_ended_after_s"] = ended[name_of(0)];
+    json["small_ended_after_s"] = {
+        {"first", Percentile(small, 0)}, {"median", Percentile(small, 0.5)}, {"last", Percentile(small, 1)}};
+  }
+  std::printf("%s\n", json.dump(2).c_str());
+  return 0;
+}
+
+}  // namespace
+}  // namespace meshwright::scale
+
+int main(int argc, char** argv) {
+  meshwright::scale::Settings settings;
+  CLI::App program("Measures the service without photographs");
+  program.add_option("--coordinator-program", settings.coordinator_program)->required();
+  program.add_option("--store", settings.store)->check(CLI::IsMember({"postgres", "sqlite"}))->capture_default_str();
+  program.add_option("--cameras", settings.cameras)->capture_default_str();
+  program.add_option("--reconstructions", settings.reconstructions)->capture_default_str();
+  program.add_option("--small-cameras", settings.small_cameras, "of all reconstructions but the first")
+      ->capture_default_str();
+  program.add_option("--workers", settings.workers)->capture_default_str();
+  program.add_option("--job-ms", settings.job_ms)->capture_default_str();
+  program.add_option("--window", settings.window)->capture_default_str();
+  CLI11_PARSE(program, argc, argv);
+  return meshwright::scale::Measure(settings);
+}
