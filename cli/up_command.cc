@@ -46,6 +46,9 @@ int Up(Arguments& arguments) {
   }
   for (const auto& worker : workers) threads.emplace_back([&worker] { worker->Run(); });
   std::printf("listening on port %d\n", (*coordinator)->port());
+  if (const int port = (*coordinator)->rest_port(); port > 0) {
+    std::printf("the dashboard is at http://127.0.0.1:%d/\n", port);
+  }
   std::fflush(stdout);
   WaitForStopSignal();
   // Jobs that run are lost; whoever starts this again goes on from the last commit.
@@ -61,6 +64,7 @@ int Up(Arguments& arguments) {
 void AddUpCommand(CLI::App& program, Run& run) {
   auto arguments = std::make_shared<Arguments>();
   arguments->coordinator.data_folder = "meshwright-data";
+  arguments->coordinator.rest_listen = "127.0.0.1:7421";
   CLI::App& command = *program.add_subcommand("up", "Run a coordinator and workers on this machine");
   command.footer(kExamples);
   CoordinatorSettings& settings = arguments->coordinator;
@@ -68,6 +72,7 @@ void AddUpCommand(CLI::App& program, Run& run) {
   command.add_option("--data", settings.data_folder, "folder for everything that is kept")->capture_default_str();
   command.add_option("--scene-root", settings.scene_roots, "folders that scenes may be taken from by reference")
       ->delimiter(':');
+  AddRestOptions(command, settings);
   command.add_option("--workers", arguments->workers, "that share the cores of this machine")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();

@@ -9,16 +9,24 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "cli/service/open_rest.h"
 #include "cli/service/open_stores.h"
 #include "cli/service/parse_method.h"
 #include "common/base/clock.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
+#include "common/telemetry/measured_blob_store.h"
+#include "common/telemetry/metrics.h"
+#include "common/telemetry/metrics_server.h"
 #include "coordinator/api/reconstruction_logic.h"
 #include "coordinator/api/worker_logic.h"
 #include "coordinator/grpc/grpc_server.h"
+#include "coordinator/rest/rest_server.h"
 #include "coordinator/store/job_store.h"
+#include "coordinator/telemetry/cluster_gauges.h"
+#include "coordinator/telemetry/measured_sql_database.h"
+#include "coordinator/telemetry/rpc_metrics.h"
 
 namespace meshwright {
 namespace {
@@ -57,10 +65,16 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
           absl::StrCat(settings_.data_folder, ": cannot make the folder: ", error.message()));
     }
     const std::string& data = settings_.data_folder;
-    MW_ASSIGN_OR_RETURN(store_, OpenJobStore(settings_.store.empty() ? absl::StrCat("sqlite:", data, "/state.sqlite")
-                                                                     : settings_.store));
-    MW_ASSIGN_OR_RETURN(blobs_,
+    const std::string where =
+        settings_.store.empty() ? absl::StrCat("sqlite:", data, "/state.sqlite") : settings_.store;
+    MW_ASSIGN_OR_RETURN(store_, OpenJobStore(where, [this](std::unique_ptr<SqlDatabase> database) {
+                          auto measured = std::make_unique<MeasuredSqlDatabase>(std::move(database), metrics_);
+                          database_ = measured.get();
+                          return measured;
+                        }));
+    MW_ASSIGN_OR_RETURN(unmeasured_blobs_,
                         OpenBlobStore(settings_.blobs.empty() ? absl::StrCat(data, "/blobs") : settings_.blobs));
+    blobs_ = std::make_unique<MeasuredBlobStore>(*unmeasured_blobs_, metrics_);
     const ConductingEnvironment environment = {.store = store_.get(),
                                                .blobs = blobs_.get(),
                                                .clock = &clock_,
@@ -70,18 +84,34 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
     MW_ASSIGN_OR_RETURN(reconstructions_,
                         ReconstructionLogic::Open(
                             {.data_folder = settings_.data_folder, .scene_roots = settings_.scene_roots}, environment));
-    MW_ASSIGN_OR_RETURN(server_, GrpcServer::Start(settings_.listen, *reconstructions_, workers_, *blobs_));
+    GrpcServer::Interceptors interceptors;
+    interceptors.push_back(MakeRpcMetrics(metrics_));
+    MW_ASSIGN_OR_RETURN(
+        server_, GrpcServer::Start(settings_.listen, *reconstructions_, workers_, *blobs_, std::move(interceptors)));
+    MW_ASSIGN_OR_RETURN(rest_server_, OpenRest(settings_, *reconstructions_, workers_, *blobs_, *store_));
+    MW_RETURN_IF_ERROR(ServeMetrics());
     ticker_ = std::thread([this] { Tick(); });
     return absl::OkStatus();
   }
 
   int port() const override { return server_->port(); }
+  int rest_port() const override { return rest_server_ != nullptr ? rest_server_->port() : 0; }
+  int metrics_port() const override { return metrics_server_ != nullptr ? metrics_server_->port() : 0; }
 
   void Shutdown(absl::Duration deadline) override {
+    if (rest_server_ != nullptr) rest_server_->Shutdown();
     if (server_ != nullptr) server_->Shutdown(deadline);
   }
 
  private:
+  absl::Status ServeMetrics() {
+    if (settings_.metrics_listen.empty()) return absl::OkStatus();
+    AddClusterGauges(metrics_, *database_, workers_, settings_.data_folder);
+    const auto ready = [this] { return database_->Now().status(); };
+    MW_ASSIGN_OR_RETURN(metrics_server_, MetricsServer::Start(settings_.metrics_listen, metrics_, ready));
+    return absl::OkStatus();
+  }
+
   void Tick() {
     const auto every = absl::ToChronoMilliseconds(lease_.lease / kLooksPerLease);
     std::unique_lock<std::mutex> lock(mutex_);
@@ -91,12 +121,17 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
   const CoordinatorSettings settings_;
   const LeaseOptions lease_;
   const RealClock clock_;
+  Metrics metrics_{"coordinator"};
   ThreadPool pool_;
   WorkerLogic workers_;
   std::unique_ptr<JobStore> store_;
+  SqlDatabase* database_ = nullptr;  // the store's
+  std::unique_ptr<BlobStore> unmeasured_blobs_;
   std::unique_ptr<BlobStore> blobs_;
   std::unique_ptr<ReconstructionLogic> reconstructions_;
   std::unique_ptr<GrpcServer> server_;
+  std::unique_ptr<RestServer> rest_server_;  // null: none
+  std::unique_ptr<MetricsServer> metrics_server_;
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stopping_ = false;

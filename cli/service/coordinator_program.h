@@ -18,6 +18,10 @@ struct CoordinatorSettings {
   int threads = 1;                        // for acceptance and joining
   double lease_seconds = 30;
   double job_time_limit_seconds = 7200;
+  std::string rest_listen;                // host:port for HTTP; port 0 takes a free one; "": none
+  std::string page_folder;                // the dashboard's files; "": where they are installed, if they are
+  std::string api_token_file;             // what callers over HTTP have to show is in it; "": nothing
+  std::string metrics_listen;  // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
 };
 
 // A coordinator as meshwright-coordinator and "meshwright up" run it.
@@ -26,6 +30,8 @@ class CoordinatorProgram {
   static absl::StatusOr<std::unique_ptr<CoordinatorProgram>> Start(const CoordinatorSettings& settings);
   virtual ~CoordinatorProgram() = default;
   virtual int port() const = 0;
+  virtual int rest_port() const = 0;     // 0: none
+  virtual int metrics_port() const = 0;  // 0: none
   // Ends calls after `deadline` at the latest. State is safe whenever the process ends.
   virtual void Shutdown(absl::Duration deadline) = 0;
 };

@@ -24,10 +24,12 @@ std::string Environment(const char* name, const std::string& otherwise) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where) {
-  if (absl::StartsWith(where, kSqliteScheme)) return OpenSqliteJobStore(where.substr(sizeof(kSqliteScheme) - 1));
+absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where, const WrapSqlDatabase& wrap) {
+  if (absl::StartsWith(where, kSqliteScheme)) {
+    return OpenSqliteJobStore(where.substr(sizeof(kSqliteScheme) - 1), nullptr, wrap);
+  }
   if (absl::StartsWith(where, "postgresql://") || absl::StartsWith(where, "postgres://")) {
-    return OpenPostgresJobStore(where);
+    return OpenPostgresJobStore(where, {}, wrap);
   }
   return absl::InvalidArgumentError("store: sqlite:PATH or postgresql://USER@HOST:PORT/DATABASE expected");
 }

@@ -8,11 +8,12 @@
 #include "common/blob/blob_store.h"
 #include "common/blob/s3_client.h"
 #include "coordinator/store/job_store.h"
+#include "coordinator/store/sql_database.h"
 
 namespace meshwright {
 
 // "sqlite:PATH" or "postgresql://USER@HOST:PORT/DATABASE". InvalidArgument for anything else.
-absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where);
+absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where, const WrapSqlDatabase& wrap = nullptr);
 
 // A folder, or "s3://BUCKET/PREFIX". The keys, the region and the server's address are in the environment, under the
 // names that other programs know: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_SESSION_TOKEN, AWS_REGION,

@@ -41,6 +41,18 @@ sigset_t StopSignals() {
 
 }  // namespace
 
+void AddRestOptions(CLI::App& program, CoordinatorSettings& settings) {
+  NameInEnvironment(
+      program
+          .add_option("--rest-listen", settings.rest_listen,
+                      "host:port for the REST interface and the dashboard; port 0 takes a free one [none]")
+          ->capture_default_str());
+  NameInEnvironment(program.add_option("--dashboard", settings.page_folder,
+                                       "folder with the dashboard's files [where they are installed]"));
+  NameInEnvironment(program.add_option("--api-token-file", settings.api_token_file,
+                                       "file with the token that callers over HTTP have to show [none is asked for]"));
+}
+
 void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings) {
   NameInEnvironment(program
                         .add_option("--listen", settings.listen,
@@ -71,6 +83,8 @@ void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings) {
                                     "a camera that takes longer counts as failed")
                         ->check(CLI::Range(1.0, 1e6))
                         ->capture_default_str());
+  AddRestOptions(program, settings);
+  AddMetricsOption(program, settings.metrics_listen);
 }
 
 void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {

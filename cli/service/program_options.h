@@ -12,6 +12,8 @@ namespace meshwright {
 // Options of the long-running programs. Each can be given as a flag, as an environment variable (both named by --help)
 // or in a configuration file (--config FILE, lines "name = value"), in this order of precedence.
 void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings);
+// --rest-listen and what belongs to it; AddCoordinatorOptions has them.
+void AddRestOptions(CLI::App& program, CoordinatorSettings& settings);
 void AddWorkerOptions(CLI::App& program, WorkerSettings& settings);
 void AddConfigOption(CLI::App& program);
 

@@ -62,6 +62,19 @@ absl::Status PreviewPart(const RestContext& context, RestCall& call) {
   });
 }
 
+// One surface in memory at a time.
+absl::Status WriteUnion(const v1::ListPartsResponse& parts, BlobStore& blobs, const std::string& path) {
+  MW_ASSIGN_OR_RETURN(
+      PlyStreamWriter writer,
+      PlyStreamWriter::Create(path, {.normals = true, .colors = true, .quality = true, .cameras = true}));
+  for (const v1::Part& part : parts.parts()) {
+    MW_ASSIGN_OR_RETURN(const std::string bytes, blobs.Get(part.sha256()));
+    MW_ASSIGN_OR_RETURN(const PatchLattice surface, DecodeSurface(bytes));
+    MW_RETURN_IF_ERROR(writer.Append(MeshOfSurface(surface)));
+  }
+  return writer.Commit();
+}
+
 // The parts accepted so far, side by side.
 absl::Status SendPartialMesh(const RestContext& context, RestCall& call) {
   const std::string& id = call.path.at("id");
@@ -69,12 +82,8 @@ absl::Status SendPartialMesh(const RestContext& context, RestCall& call) {
   std::string digests;
   for (const v1::Part& part : parts.parts()) digests += part.sha256();
   const std::string key = absl::StrCat("union-", Sha256Hex(digests));
-  MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& path) {
-    const auto load = [&](int64_t index) -> absl::StatusOr<PatchLattice> {
-      MW_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->Get(parts.parts(static_cast<int>(index)).sha256()));
-      return DecodeSurface(bytes);
-    };
-    return WriteSurfaceUnion(parts.parts_size(), load, path).status();
+  MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& to) {
+    return WriteUnion(parts, *context.blobs, to);
   }));
   return SendFile(call, std::move(file), key, kPlyType, absl::StrCat(id, "-partial.ply"));
 }
