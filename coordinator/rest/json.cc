@@ -1,5 +1,7 @@
 #include "coordinator/rest/json.h"
 
+#include <memory>
+
 #include <absl/strings/str_cat.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/util/json_util.h>
@@ -30,12 +32,14 @@ absl::Status FromJson(const std::string& json, google::protobuf::Message& messag
     // What is nested is not looked into: it may be nested more deeply than the stack is high.
     nlohmann::json single = nlohmann::json::object();
     if (!value.is_structured()) single[name] = value;
-    const bool taken = !single.empty() && google::protobuf::util::JsonStringToMessage(single.dump(), &message).ok();
+    const std::unique_ptr<google::protobuf::Message> parsed(message.New());
+    const bool taken = !single.empty() && google::protobuf::util::JsonStringToMessage(single.dump(), parsed.get()).ok();
     if (!taken) {
       const std::string said = value.is_structured() ? value.type_name() : value.dump().substr(0, 64);
       return FieldError(
           name, absl::InvalidArgumentError(absl::StrCat(name, " is ", said, ", expected a ", field->cpp_type_name())));
     }
+    message.MergeFrom(*parsed);
   }
   return absl::OkStatus();
 }
