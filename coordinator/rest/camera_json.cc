@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <absl/strings/str_cat.h>
+#include <absl/time/clock.h>
 #include <absl/time/time.h>
 
 #include "common/base/status_macros.h"
@@ -53,6 +54,30 @@ void AddReport(const v1::Camera& camera, Json& json) {
   json["seconds"] = std::move(seconds);
 }
 
+constexpr char kInfo[] = "info";
+constexpr char kWarning[] = "warning";
+constexpr char kError[] = "error";
+constexpr ptrdiff_t kMaxLogEntries = 1000;
+
+struct LogEntry {
+  absl::Time time;
+  const char* severity = kInfo;
+  std::string message;
+  int32_t camera = -1;  // -1: about none
+};
+
+absl::Time TimeOf(const google::protobuf::Timestamp& timestamp) {
+  return absl::FromUnixSeconds(timestamp.seconds()) + absl::Nanoseconds(timestamp.nanos());
+}
+
+Json EntryJson(const LogEntry& entry) {
+  Json json = {{"time", absl::FormatTime("%Y-%m-%dT%H:%M:%E3SZ", entry.time, absl::UTCTimeZone())},
+               {"severity", entry.severity},
+               {"message", entry.message}};
+  if (entry.camera >= 0) json["camera"] = entry.camera;
+  return json;
+}
+
 }  // namespace
 
 absl::StatusOr<Json> CamerasJson(const ReconstructionLogic& logic, const std::string& id) {
@@ -75,8 +100,30 @@ absl::StatusOr<Json> CamerasJson(const ReconstructionLogic& logic, const std::st
 
 absl::StatusOr<Json> LogJson(const ReconstructionLogic& logic, const std::string& id) {
   MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, logic.Get(id));
+  MW_ASSIGN_OR_RETURN(const v1::ListCamerasResponse cameras, logic.ListCameras(id));
+  std::vector<LogEntry> entries;
+  entries.push_back({TimeOf(reconstruction.create_time()), kInfo, "created"});
+  const absl::Time now = reconstruction.has_finish_time() ? TimeOf(reconstruction.finish_time()) : absl::Now();
+  for (const v1::Camera& camera : cameras.cameras()) {
+    if (camera.state() != v1::CAMERA_STATE_SET_ASIDE) continue;
+    entries.push_back(
+        {now, kWarning, absl::StrCat(camera.name(), " was set aside: ", camera.set_aside_reason()), camera.index()});
+  }
+  if (reconstruction.has_finish_time()) {
+    const bool failed = reconstruction.state() == v1::RECONSTRUCTION_STATE_FAILED;
+    entries.push_back({now, failed ? kError : kInfo,
+                       failed                                                    ? reconstruction.failure()
+                       : reconstruction.state() == v1::RECONSTRUCTION_STATE_DONE ? "done"
+                                                                                 : "cancelled"});
+  }
+  std::stable_sort(entries.begin(), entries.end(),
+                   [](const LogEntry& a, const LogEntry& b) { return a.time < b.time; });
+  if (static_cast<ptrdiff_t>(entries.size()) > kMaxLogEntries)
+    entries.erase(entries.begin(), entries.end() - kMaxLogEntries);
+  Json list = Json::array();
+  for (const LogEntry& entry : entries) list.push_back(EntryJson(entry));
   Json response;
-  response["entries"] = Json::array();
+  response["entries"] = std::move(list);
   return response;
 }
 
