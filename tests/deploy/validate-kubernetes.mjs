@@ -1,0 +1,147 @@
+// Validates what "kubectl kustomize" built: node validate-kubernetes.mjs NAME FILE. Each object against the schema of
+// its kind (Kubernetes' and KEDA's, from npm), with unknown fields refused; then what no schema says: selectors that
+// select, names that exist, programs that cannot write or become root, drains that fit into grace periods.
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { parseAllDocuments } from "yaml";
+
+const require = createRequire(import.meta.url);
+const [name, file] = process.argv.slice(2);
+const errors = [];
+const objects = parseAllDocuments(readFileSync(file, "utf8")).map((document) => {
+  errors.push(...document.errors.map(String));
+  return document.toJS();
+});
+const complain = (object, message) => errors.push(`${object.kind} ${object.metadata?.name}: ${message}`);
+
+function modelOf(object) {
+  const [group, version] = object.apiVersion.includes("/") ? object.apiVersion.split("/") : ["", object.apiVersion];
+  const path = group.startsWith("keda.") ? `@kubernetes-models/keda/${group}/${version}`
+    : `kubernetes-models/${group === "" ? "" : group + "/"}${version}`;
+  try {
+    return require(path)[object.kind];
+  } catch {
+    return undefined;
+  }
+}
+
+function validateSchema(object) {
+  const Model = modelOf(object);
+  if (Model === undefined) return complain(object, `${object.apiVersion} ${object.kind} is no kind that is known`);
+  try {
+    new Model(object).validate();
+  } catch (error) {
+    complain(object, error.message);
+  }
+}
+
+// The published schemas let unknown fields pass; these are the places where a misspelt one would be missed.
+const known = {
+  container: ["args", "command", "env", "envFrom", "image", "imagePullPolicy", "livenessProbe", "name", "ports",
+    "readinessProbe", "resources", "securityContext", "startupProbe", "volumeMounts"],
+  port: ["containerPort", "name", "protocol"],
+  env: ["name", "value", "valueFrom"],
+  probe: ["failureThreshold", "httpGet", "initialDelaySeconds", "periodSeconds", "timeoutSeconds"],
+  deployment: ["replicas", "selector", "strategy", "template"],
+  pod: ["automountServiceAccountToken", "containers", "securityContext", "terminationGracePeriodSeconds",
+    "topologySpreadConstraints", "volumes"],
+};
+function onlyKnown(object, what, value) {
+  for (const field of Object.keys(value ?? {})) {
+    if (!known[what].includes(field)) complain(object, `unknown field ${field} of a ${what}`);
+  }
+}
+
+const named = (kind) => new Set(objects.filter((o) => o.kind === kind).map((o) => o.metadata.name));
+const secretsOfTheUser = new Set(["meshwright-postgres", "meshwright-s3"]);
+const podLabels = objects.filter((o) => o.kind === "Deployment").map((o) => o.spec.template.metadata.labels);
+const selects = (selector) =>
+  podLabels.some((labels) => Object.entries(selector ?? {}).every(([key, value]) => labels[key] === value));
+
+function checkContainer(object, container) {
+  onlyKnown(object, "container", container);
+  container.ports.forEach((port) => onlyKnown(object, "port", port));
+  for (const probe of ["livenessProbe", "readinessProbe", "startupProbe"]) onlyKnown(object, "probe", container[probe]);
+  const security = container.securityContext ?? {};
+  if (security.readOnlyRootFilesystem !== true) complain(object, "its root file system can be written");
+  if (security.allowPrivilegeEscalation !== false) complain(object, "it may get more rights");
+  if (!security.capabilities?.drop?.includes("ALL")) complain(object, "it keeps capabilities");
+  if (!container.resources?.requests?.memory || !container.resources?.limits?.memory) complain(object, "no memory said");
+  const ports = new Set(container.ports.map((port) => port.name));
+  for (const probe of [container.livenessProbe, container.readinessProbe]) {
+    if (!ports.has(probe?.httpGet?.port)) complain(object, `a probe of a port that is not there: ${JSON.stringify(probe)}`);
+  }
+  for (const entry of container.env ?? []) {
+    onlyKnown(object, "env", entry);
+    const secret = entry.valueFrom?.secretKeyRef;
+    if (secret && !secretsOfTheUser.has(secret.name)) complain(object, `secret ${secret.name} is not documented`);
+  }
+  for (const source of container.envFrom ?? []) {
+    const map = source.configMapRef?.name;
+    if (map && !named("ConfigMap").has(map)) complain(object, `config map ${map} is not there`);
+    const secret = source.secretRef?.name;
+    if (secret && !secretsOfTheUser.has(secret)) complain(object, `secret ${secret} is not documented`);
+  }
+  if (!/:[^:]+$/.test(container.image) || container.image.endsWith(":latest")) complain(object, "its image has no version");
+}
+
+function checkDeployment(object) {
+  const pod = object.spec.template.spec;
+  onlyKnown(object, "deployment", object.spec);
+  onlyKnown(object, "pod", pod);
+  if (pod.securityContext?.runAsNonRoot !== true) complain(object, "it may run as root");
+  if (pod.automountServiceAccountToken !== false) complain(object, "it gets a token that it does not need");
+  if (!selects(object.spec.selector.matchLabels)) complain(object, "its selector selects nothing");
+  pod.containers.forEach((container) => checkContainer(object, container));
+  const volumes = new Set(pod.volumes.map((volume) => volume.name));
+  for (const mount of pod.containers.flatMap((container) => container.volumeMounts)) {
+    if (!volumes.has(mount.name)) complain(object, `volume ${mount.name} is not there`);
+  }
+  for (const volume of pod.volumes) {
+    const claim = volume.persistentVolumeClaim?.claimName;
+    if (claim && !named("PersistentVolumeClaim").has(claim)) complain(object, `claim ${claim} is not there`);
+  }
+  const env = pod.containers.flatMap((container) => container.env ?? []);
+  const drain = env.find((entry) => entry.name === "MESHWRIGHT_DRAIN_SECONDS");
+  if (drain && pod.terminationGracePeriodSeconds < Number(drain.value) + 15) {
+    complain(object, "it is killed before it is drained");
+  }
+  if (!objects.some((o) => o.kind === "PodDisruptionBudget" &&
+      Object.entries(o.spec.selector.matchLabels).every(([k, v]) => object.spec.template.metadata.labels[k] === v))) {
+    complain(object, "no disruption budget");
+  }
+}
+
+function checkScaling(object) {
+  if (!named("Deployment").has(object.spec.scaleTargetRef.name)) complain(object, "it scales what is not there");
+  const trigger = object.spec.triggers[0];
+  for (const value of Object.values(trigger.metadata)) {
+    if (typeof value !== "string") complain(object, "metadata of a trigger are texts");
+  }
+  const target = objects.find((o) => o.kind === "Deployment" && o.metadata.name === object.spec.scaleTargetRef.name);
+  const cores = target?.spec.template.spec.containers[0].resources.requests.cpu;
+  if (String(trigger.metadata.threshold) !== String(cores)) complain(object, "the threshold is not a worker's cores");
+  if (target?.spec.replicas !== undefined) complain(object, "the deployment would be reset to its own number");
+}
+
+for (const object of objects) {
+  validateSchema(object);
+  if (object.kind !== "Namespace" && object.metadata?.namespace !== "meshwright") complain(object, "another namespace");
+  if (object.kind === "Deployment") checkDeployment(object);
+  if (object.kind === "ScaledObject") checkScaling(object);
+  if (object.kind === "Service" && !selects(object.spec.selector)) complain(object, "its selector selects nothing");
+  if (object.kind === "PodDisruptionBudget" && !selects(object.spec.selector?.matchLabels)) {
+    complain(object, "its selector selects nothing");
+  }
+  if (object.kind === "NetworkPolicy" && !selects(object.spec.podSelector?.matchLabels)) {
+    complain(object, "its selector selects nothing");
+  }
+}
+for (const kind of ["Deployment", "Service", "PodDisruptionBudget", "NetworkPolicy", "ScaledObject"]) {
+  if (named(kind).size === 0) errors.push(`no ${kind}`);
+}
+if (errors.length > 0) {
+  console.error(errors.map((error) => `${name}: ${error}`).join("\n"));
+  process.exit(1);
+}
+console.log(`${name}: ${objects.length} objects are valid`);
