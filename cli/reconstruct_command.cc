@@ -9,10 +9,14 @@
 
 #include "cli/commands.h"
 #include "cli/local/local_reconstruction.h"
+#include "cli/local/loss_accounting.h"
 #include "cli/progress_display.h"
 #include "common/base/bad_input.h"
 #include "common/base/clock.h"
+#include "common/base/files.h"
 #include "common/base/status_macros.h"
+#include "common/mesh/ply.h"
+#include "common/scene/view.h"
 
 namespace meshwright {
 namespace {
@@ -28,7 +32,8 @@ struct Arguments {
   ReconstructionOptions options;
   LocalSettings settings;
   bool parts = false;
-  int64_t memory_mib = 0;  // 0: by the number of threads
+  int64_t memory_mib = 0;    // 0: by the number of threads
+  std::string ground_truth;  // PLY; "": none
   OutputSettings output;
 };
 
@@ -64,6 +69,30 @@ void PrintSummary(const nlohmann::ordered_json& report, const LocalSettings& set
               FormatBytes(process["peak_memory_bytes"].get<double>()).c_str());
 }
 
+absl::StatusOr<std::unique_ptr<LossAccounting>> FollowLosses(const Arguments& arguments, const Scene& scene,
+                                                             ThreadPool& pool) {
+  const absl::StatusOr<TriangleMesh> ground_truth = ReadPly(arguments.ground_truth);
+  if (!ground_truth.ok()) return BadInput(ground_truth.status());
+  if (const absl::Status usable = LossAccounting::Check(*ground_truth); !usable.ok()) {
+    return BadInput(absl::InvalidArgumentError(absl::StrCat(arguments.ground_truth, ": ", usable.message())));
+  }
+  std::vector<Camera> cameras;
+  for (const SceneView& view : scene.views) {
+    cameras.push_back(UndistortedCamera(view, arguments.options.max_image_size));
+  }
+  return std::make_unique<LossAccounting>(*ground_truth, std::move(cameras), arguments.options.job.lattice_step, pool);
+}
+
+// Compares the mesh with the ground truth and adds the losses to report.json.
+absl::Status AccountForLosses(const LossAccounting& losses, const LocalSettings& settings, ThreadPool& pool,
+                              nlohmann::ordered_json& report) {
+  MW_ASSIGN_OR_RETURN(const TriangleMesh mesh, ReadPly(settings.output_path));
+  const LossReport lost = losses.Account(mesh, pool);
+  report["losses"] = ToJson(lost);
+  std::fputs(ToText(lost).c_str(), stderr);
+  return WriteFileAtomically(settings.report_path, report.dump(2) + "\n");
+}
+
 int Reconstruct(Arguments& arguments) {
   LocalSettings& settings = arguments.settings;
   if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
@@ -81,13 +110,31 @@ int Reconstruct(Arguments& arguments) {
   std::signal(SIGTERM, OnStopSignal);
   const RealClock clock;
   ProgressDisplay display(ProgressDisplay::StyleFor(stderr, arguments.output.quiet), stderr, clock);
-  const CameraJobFunction job = [&](const CameraJobInput& input, ThreadPool& pool) {
+  CameraJobFunction job = [&](const CameraJobInput& input, ThreadPool& pool) {
     return RunCameraJob(input, arguments.options.job, pool);
   };
+  ThreadPool losses_pool(settings.threads);
+  std::unique_ptr<LossAccounting> losses;
+  if (!arguments.ground_truth.empty()) {
+    absl::StatusOr<std::unique_ptr<LossAccounting>> followed = FollowLosses(arguments, *scene, losses_pool);
+    if (!followed.ok()) return Fail(followed.status());
+    losses = *std::move(followed);
+    job = [&](const CameraJobInput& input, ThreadPool& pool) {
+      PatchStacks grown;
+      CameraJobResult result = RunFollowedCameraJob(input, arguments.options.job, grown, pool);
+      losses->RecordJob(input, arguments.options.job, grown, result.filtered, pool);
+      return result;
+    };
+    settings.accepted_listener = [&](const PatchLattice& accepted) { losses->RecordAccepted(accepted); };
+  }
   absl::StatusOr<nlohmann::ordered_json> report = ReconstructLocally(
       *scene, arguments.options, settings, job, [&](const LocalProgress& progress) { display.Show(progress); });
   display.End();
   if (!report.ok()) return Fail(report.status());
+  if (losses != nullptr) {
+    const absl::Status accounted = AccountForLosses(*losses, settings, losses_pool, *report);
+    if (!accounted.ok()) return Fail(accounted);
+  }
   if (arguments.output.json) {
     report->erase("cameras");
     (*report)["report"] = settings.report_path;
@@ -113,6 +160,8 @@ void AddReconstructCommand(CLI::App& program, Run& run) {
                      "state and surfaces while it runs [OUTPUT.ply.work]; removed at the end");
   command.add_flag("--keep-work-dir", arguments->settings.keep_work_folder, "do not remove it at the end");
   command.add_flag("--restart", arguments->settings.restart, "begin anew, whatever the work folder holds");
+  command.add_option("--ground-truth", arguments->ground_truth,
+                     "the true surface, a PLY mesh: say at which stage each of its pixels that is missing was lost");
   AddThreadsOption(command, arguments->settings.threads);
   command
       .add_option("--memory", arguments->memory_mib,

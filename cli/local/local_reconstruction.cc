@@ -196,6 +196,12 @@ class LocalReconstruction {
     if (!settings_.parts_folder.empty()) {
       MW_RETURN_IF_ERROR(WriteParts(scene_, surfaces, work_->blobs(), settings_.parts_folder));
     }
+    if (settings_.accepted_listener) {
+      for (const AcceptedSurface& surface : surfaces) {
+        MW_ASSIGN_OR_RETURN(const PatchLattice accepted, LoadAcceptedSurface(work_->blobs(), surface));
+        settings_.accepted_listener(accepted);
+      }
+    }
     const auto count = static_cast<int>(surfaces.size());
     int loaded = 0;  // each at least twice
     const auto loading = [&] { Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count); };

@@ -10,6 +10,7 @@
 #include "cli/local/job_runner.h"
 #include "cli/local/reconstruction_options.h"
 #include "common/scene/scene.h"
+#include "common/surface/patch_lattice.h"
 
 namespace meshwright {
 
@@ -23,6 +24,8 @@ struct LocalSettings {
   bool keep_work_folder = false;         // do not remove it at the end
   int threads = 1;                       // cores to use, >= 1
   int64_t memory_limit_bytes = 1 << 30;  // how many jobs run at the same time follows from it
+  // Told of every accepted surface M_r before the mesh is written; may be empty.
+  std::function<void(const PatchLattice&)> accepted_listener;
 };
 
 enum class LocalStage { kChecking, kPairs, kCameras, kJoining };

@@ -24,12 +24,6 @@ class StageTimer {
   absl::Time start_ = absl::Now();
 };
 
-PatchScorer MakeScorer(const CameraJobInput& input, const CameraJobOptions& options) {
-  std::vector<ScoredView> targets;
-  for (const JobView& target : input.targets) targets.push_back({target.camera, target.grey});
-  return PatchScorer({input.reference.camera, input.reference.grey}, std::move(targets), options.scoring);
-}
-
 std::vector<SparsePointObservation> ObservationsOf(const CameraJobInput& input) {
   std::vector<SparsePointObservation> observations;
   for (size_t i = 0; i < input.sparse_points.size(); ++i) {
@@ -57,7 +51,19 @@ absl::Status CameraJobOptions::Validate() const {
   return filtering.Validate();
 }
 
+PatchScorer MakeScorer(const CameraJobInput& input, const CameraJobOptions& options) {
+  std::vector<ScoredView> targets;
+  for (const JobView& target : input.targets) targets.push_back({target.camera, target.grey});
+  return PatchScorer({input.reference.camera, input.reference.grey}, std::move(targets), options.scoring);
+}
+
 CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
+  PatchStacks grown;
+  return RunFollowedCameraJob(input, options, grown, pool);
+}
+
+CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJobOptions& options, PatchStacks& grown,
+                                     ThreadPool& pool) {
   MW_CHECK(input.targets.size() <= kMaxTargets);
   CameraJobResult result;
   CameraJobReport& report = result.report;
@@ -82,14 +88,14 @@ CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions
   report.seconds_seeding = timer.Lap();
 
   // Section 3.6: growing.
-  const PatchStacks stacks = Grow(scorer, seeding.seeds, input.accepted, options.growing, pool);
-  report.patches_grown = static_cast<int64_t>(stacks.patches.size());
-  report.rays_grown = stacks.CountRays();
-  report.tentative_patches_scored = stacks.tentative_patches_scored;
+  grown = Grow(scorer, seeding.seeds, input.accepted, options.growing, pool);
+  report.patches_grown = static_cast<int64_t>(grown.patches.size());
+  report.rays_grown = grown.CountRays();
+  report.tentative_patches_scored = grown.tentative_patches_scored;
   report.seconds_growing = timer.Lap();
 
   // Section 3.7: MRF filtering, then depth and normals beyond the step d_r.
-  FilteringResult filtering = FilterPatches(stacks, reference, options.filtering, pool);
+  FilteringResult filtering = FilterPatches(grown, reference, options.filtering, pool);
   report.mrf_energy = filtering.energy;
   report.mrf_lower_bound = filtering.lower_bound;
   report.seconds_filtering = timer.Lap();

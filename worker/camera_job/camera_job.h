@@ -81,6 +81,13 @@ struct CameraJobResult {
 // depends on input and options alone, not on the number of threads in `pool`.
 CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool);
 
+// The same; `grown` gets G_r, for who wants to see what filtering chose from.
+CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJobOptions& options, PatchStacks& grown,
+                                     ThreadPool& pool);
+
+// What the job compares photographs with.
+PatchScorer MakeScorer(const CameraJobInput& input, const CameraJobOptions& options);
+
 // Bytes that RunCameraJob will need at most beside its input, for a reference of this size.
 int64_t EstimateCameraJobBytes(const Camera& reference, const CameraJobOptions& options);
 
