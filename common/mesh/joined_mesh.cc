@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -13,173 +12,23 @@
 
 #include "common/base/check.h"
 #include "common/base/status_macros.h"
-#include "common/geometry/level_of_detail.h"
 #include "common/mesh/border_stitching.h"
 #include "common/mesh/disjoint_sets.h"
 #include "common/mesh/part_mesh.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/seam_blending.h"
-#include "common/mesh/surface_overlap.h"
 
 namespace meshwright {
 namespace {
 
 constexpr PlyAttributes kAttributes = {.normals = true, .colors = true, .quality = true, .cameras = true};
-constexpr double kOverlapSteps = 3;  // the radius of support in section 3.7
 // Seams are one or two steps wide; the circle through their corners is a little larger.
 constexpr double kStitchReach = 2;
-// Steep patches lie further apart than d_r, but not more than this many times.
-constexpr float kMostSpacing = 4;
 // Offsets at a seam are averaged over this many vertices to either side, so that texture does not smear.
 constexpr int kSeamSmoothing = 8;
-// Nodes of earlier surfaces kept to compare with (about 25 bytes each).
-constexpr int64_t kMostCachedNodes = 4'000'000;
-
-// What is kept of every part while all are joined.
-struct Part {
-  std::vector<bool> trimmed;    // per patch, in the order of the nodes
-  int32_t first_border = 0;     // of its vertices in the stitcher
-  int32_t first_component = 0;  // of its components
-};
-
-struct BorderOrigin {
-  int32_t vertex = 0;     // of its part
-  int32_t node = 0;       // of its part's lattice
-  int32_t component = 0;  // of all parts
-  std::array<uint8_t, 3> color = {};
-};
-
-// Everything that is known of the parts after they have been looked at one by one.
-struct Borders {
-  std::vector<Part> parts;  // and one more, which holds the ends
-  std::vector<BorderVertex> vertices;
-  std::vector<BorderOrigin> origins;
-  std::vector<std::pair<int32_t, int32_t>> inner_edges;
-  std::vector<int64_t> faces_of_component;
-};
-
-Eigen::Vector3f PointOf(const PatchLattice& surface, int32_t node) {
-  return surface.Point(node % surface.lattice.columns, node / surface.lattice.columns).cast<float>();
-}
-
-std::vector<bool> TrimmedPatches(const PatchLattice& surface, const std::vector<uint8_t>& removed) {
-  std::vector<bool> trimmed;
-  for (size_t node = 0; node < removed.size(); ++node) {
-    if (surface.depth[node] > 0) trimmed.push_back(removed[node] != 0);
-  }
-  return trimmed;
-}
-
-std::vector<uint8_t> RemovedNodes(const PatchLattice& surface, const std::vector<bool>& trimmed) {
-  std::vector<uint8_t> removed(surface.depth.size(), 0);
-  size_t patch = 0;
-  for (size_t node = 0; node < removed.size(); ++node) {
-    if (surface.depth[node] > 0) removed[node] = trimmed[patch++] ? 1 : 0;
-  }
-  return removed;
-}
-
-// Earlier surfaces, the last used ones in memory.
-class CoveringSurfaces {
- public:
-  explicit CoveringSurfaces(const LoadSurface& load) : load_(load) {}
-
-  absl::StatusOr<std::shared_ptr<const CoveringSurface>> Get(int64_t index) {
-    const auto at = std::ranges::find(kept_, index, [](const auto& entry) { return entry.first; });
-    if (at != kept_.end()) {
-      std::rotate(kept_.begin(), at, at + 1);
-      return kept_.front().second;
-    }
-    MW_ASSIGN_OR_RETURN(PatchLattice surface, load_(index));
-    auto cover = std::make_shared<const CoveringSurface>(std::move(surface));
-    kept_.emplace_front(index, cover);
-    nodes_ += cover->surface.lattice.nodes();
-    while (kept_.size() > 1 && nodes_ > kMostCachedNodes) {
-      nodes_ -= kept_.back().second->surface.lattice.nodes();
-      kept_.pop_back();
-    }
-    return cover;
-  }
-
- private:
-  const LoadSurface& load_;
-  std::deque<std::pair<int64_t, std::shared_ptr<const CoveringSurface>>> kept_;  // last used first
-  int64_t nodes_ = 0;
-};
-
-void AddBorders(const PatchLattice& surface, const PartMesh& mesh, Borders& borders) {
-  const auto first_border = static_cast<int32_t>(borders.vertices.size());
-  const auto first_component = static_cast<int32_t>(borders.faces_of_component.size());
-  std::vector<int32_t> border_of_vertex(mesh.node_of_vertex.size(), -1);
-  for (size_t v = 0; v < mesh.node_of_vertex.size(); ++v) {
-    if (mesh.next_on_border[v] == PartMesh::kInterior) continue;
-    const int32_t node = mesh.node_of_vertex[v];
-    border_of_vertex[v] = static_cast<int32_t>(borders.vertices.size());
-    borders.vertices.push_back({.position = PointOf(surface, node),
-                                .normal = surface.normal_in_world[static_cast<size_t>(node)],
-                                .spacing = static_cast<float>(LevelOfDetail(
-                                    surface.camera, surface.depth[static_cast<size_t>(node)], surface.lattice.step))});
-    borders.origins.push_back({.vertex = static_cast<int32_t>(v),
-                               .node = node,
-                               .component = first_component + mesh.component_of_vertex[v],
-                               .color = surface.rgb[static_cast<size_t>(node)]});
-  }
-  std::vector<float> spacing(borders.vertices.size() - static_cast<size_t>(first_border));
-  for (size_t i = 0; i < spacing.size(); ++i) spacing[i] = borders.vertices[first_border + i].spacing;
-  for (size_t i = static_cast<size_t>(first_border); i < borders.vertices.size(); ++i) {
-    BorderVertex& vertex = borders.vertices[i];
-    const auto next_vertex = static_cast<size_t>(mesh.next_on_border[static_cast<size_t>(borders.origins[i].vertex)]);
-    vertex.next = border_of_vertex[next_vertex];
-    const float length = (vertex.position - borders.vertices[static_cast<size_t>(vertex.next)].position).norm();
-    for (const size_t end : {i, static_cast<size_t>(vertex.next)}) {
-      float& s = spacing[end - static_cast<size_t>(first_border)];
-      s = std::max(s, std::min(length, kMostSpacing * borders.vertices[end].spacing));
-    }
-  }
-  for (size_t i = 0; i < spacing.size(); ++i) borders.vertices[first_border + i].spacing = spacing[i];
-  for (const auto& face : mesh.faces) {
-    for (size_t k = 0; k < 3; ++k) {
-      const auto v = static_cast<size_t>(face[k]);
-      const auto w = static_cast<size_t>(face[(k + 1) % 3]);
-      if (v < w && border_of_vertex[v] >= 0 && border_of_vertex[w] >= 0 &&
-          mesh.next_on_border[v] != static_cast<int32_t>(w)) {
-        borders.inner_edges.emplace_back(border_of_vertex[v], border_of_vertex[w]);
-      }
-    }
-  }
-  borders.faces_of_component.insert(borders.faces_of_component.end(), mesh.faces_of_component.begin(),
-                                    mesh.faces_of_component.end());
-}
-
-absl::StatusOr<Borders> LookAtParts(int64_t count, const LoadSurface& load, ThreadPool& pool,
-                                    JoinedMeshCounts& counts) {
-  Borders borders;
-  std::vector<SurfaceOutline> outlines;
-  CoveringSurfaces earlier(load);
-  for (int64_t index = 0; index < count; ++index) {
-    MW_ASSIGN_OR_RETURN(const std::shared_ptr<const CoveringSurface> current, earlier.Get(index));
-    const PatchLattice& surface = current->surface;
-    outlines.emplace_back(surface);
-    std::vector<uint8_t> removed(surface.depth.size(), 0);
-    for (int64_t other = 0; other < index; ++other) {
-      if (!outlines.back().MayOverlap(outlines[static_cast<size_t>(other)], kOverlapSteps)) continue;
-      MW_ASSIGN_OR_RETURN(const std::shared_ptr<const CoveringSurface> cover, earlier.Get(other));
-      MarkCovered(surface, *cover, kOverlapSteps, pool, removed);
-    }
-    counts.patches_trimmed += std::ranges::count(removed, 1);
-    borders.parts.push_back({.trimmed = TrimmedPatches(surface, removed),
-                             .first_border = static_cast<int32_t>(borders.vertices.size()),
-                             .first_component = static_cast<int32_t>(borders.faces_of_component.size())});
-    AddBorders(surface, BuildPartMesh(surface, removed), borders);
-  }
-  borders.parts.push_back({.first_border = static_cast<int32_t>(borders.vertices.size()),
-                           .first_component = static_cast<int32_t>(borders.faces_of_component.size())});
-  counts.border_edges_before = static_cast<int64_t>(borders.vertices.size());
-  return borders;
-}
 
 // Border vertices of triangles without neighbours. They are noise, and to a stitcher their outside looks like a hole.
-std::vector<uint8_t> LoneTriangles(const Borders& borders) {
+std::vector<uint8_t> LoneTriangles(const PartBorders& borders) {
   std::vector<uint8_t> lone(borders.origins.size());
   for (size_t v = 0; v < lone.size(); ++v) {
     lone[v] = borders.faces_of_component[static_cast<size_t>(borders.origins[v].component)] == 1 ? 1 : 0;
@@ -188,7 +37,7 @@ std::vector<uint8_t> LoneTriangles(const Borders& borders) {
 }
 
 // Per component of a part: whether what it is stitched to has too few faces. A lone triangle always has.
-std::vector<uint8_t> SmallComponents(const Borders& borders, const std::vector<BorderStitcher::Face>& faces,
+std::vector<uint8_t> SmallComponents(const PartBorders& borders, const std::vector<BorderStitcher::Face>& faces,
                                      int64_t min_faces, int64_t& removed) {
   const size_t components = borders.faces_of_component.size();
   DisjointSets sets(components);
@@ -210,7 +59,8 @@ std::vector<uint8_t> SmallComponents(const Borders& borders, const std::vector<B
 }
 
 // Half of what separates each vertex from those of other parts that it is stitched to.
-std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders, const std::vector<BorderVertex>& vertices,
+std::vector<std::optional<SeamOffset>> SeamOffsets(const PartBorders& borders,
+                                                   const std::vector<BorderVertex>& vertices,
                                                    const std::vector<BorderStitcher::Face>& faces,
                                                    const std::vector<uint8_t>& is_stitch) {
   const size_t count = vertices.size();
@@ -254,7 +104,7 @@ std::vector<std::optional<SeamOffset>> SeamOffsets(const Borders& borders, const
       total_weight += weight[before] + weight[after];
     }
     total *= 0.5F / total_weight;
-    offsets[v] = SeamOffset{borders.origins[v].node, total};
+    offsets[v] = SeamOffset{borders.origins[v].patch, total};
   }
   return offsets;
 }
@@ -315,29 +165,130 @@ void AppendVertex(const TriangleMesh& from, size_t vertex, TriangleMesh& to) {
   to.cameras.push_back(from.cameras[vertex]);
 }
 
-// The part without the components that `small` marks. `index` gets each vertex's place in it, -1 for none.
-TriangleMesh MeshOfPart(const PatchLattice& surface, const PartMesh& part, const uint8_t* small,
-                        std::vector<int32_t>& index) {
+// One part, ready to be written.
+struct FinishedPart {
   TriangleMesh mesh;
-  index.assign(part.node_of_vertex.size(), -1);
-  for (size_t v = 0; v < index.size(); ++v) {
-    if (small[part.component_of_vertex[v]] != 0) continue;
-    index[v] = static_cast<int32_t>(mesh.positions.size());
-    const int32_t node = part.node_of_vertex[v];
-    mesh.positions.push_back(PointOf(surface, node));
-    mesh.normals.push_back(surface.normal_in_world[static_cast<size_t>(node)]);
-    mesh.colors.push_back(surface.rgb[static_cast<size_t>(node)]);
-    mesh.quality.push_back(surface.quality[static_cast<size_t>(node)]);
+  std::vector<int32_t> index;  // of each vertex of the PartMesh in the mesh; -1: left out
+};
+
+// The part without the components that `small` marks.
+FinishedPart FinishPart(const SparseSurface& surface, const PartBorders::Part& part, const uint8_t* small,
+                        const std::vector<SeamOffset>& offsets, int blend_steps) {
+  const PartMesh part_mesh = BuildPartMesh(surface, std::vector<uint8_t>(part.trimmed.begin(), part.trimmed.end()));
+  std::vector<std::array<uint8_t, 3>> colors = surface.rgb;
+  BlendSeams(offsets, blend_steps, surface, colors);
+  FinishedPart finished;
+  TriangleMesh& mesh = finished.mesh;
+  finished.index.assign(part_mesh.patch_of_vertex.size(), -1);
+  for (size_t v = 0; v < finished.index.size(); ++v) {
+    if (small[part_mesh.component_of_vertex[v]] != 0) continue;
+    finished.index[v] = static_cast<int32_t>(mesh.positions.size());
+    const auto patch = static_cast<size_t>(part_mesh.patch_of_vertex[v]);
+    mesh.positions.emplace_back(surface.Point(patch).cast<float>());
+    mesh.normals.push_back(surface.normal_in_world[patch]);
+    mesh.colors.push_back(colors[patch]);
+    mesh.quality.push_back(surface.quality[patch]);
   }
   mesh.cameras.assign(mesh.positions.size(), surface.camera_index);
-  for (const auto& face : part.faces) {
-    if (index[static_cast<size_t>(face[0])] < 0) continue;
+  for (const auto& face : part_mesh.faces) {
+    if (finished.index[static_cast<size_t>(face[0])] < 0) continue;
     std::array<uint32_t, 3> corners = {};
-    for (size_t k = 0; k < 3; ++k) corners[k] = static_cast<uint32_t>(index[static_cast<size_t>(face[k])]);
+    for (size_t k = 0; k < 3; ++k) {
+      corners[k] = static_cast<uint32_t>(finished.index[static_cast<size_t>(face[k])]);
+    }
     mesh.faces.push_back(corners);
   }
-  return mesh;
+  return finished;
 }
+
+// Everything about the joins that the writing of parts needs.
+struct Joins {
+  std::vector<BorderStitcher::Face> faces;  // border vertices, and copies of them numbered behind
+  std::vector<int32_t> copies;              // the border vertex that each is a copy of
+  std::vector<std::optional<SeamOffset>> offsets;
+  std::vector<uint8_t> small;  // per component: to be left out
+};
+
+Joins JoinBorders(PartBorders& borders, const JoinOptions& options, JoinedMeshCounts& counts) {
+  Joins joins;
+  BorderStitcher stitcher(std::move(borders.vertices), borders.inner_edges);
+  borders.inner_edges = {};
+  stitcher.Drop(LoneTriangles(borders));
+  stitcher.StitchNearby(kStitchReach);
+  joins.small = SmallComponents(borders, stitcher.faces(), options.min_component_faces, counts.components_removed);
+  std::vector<uint8_t> drop(borders.origins.size());
+  for (size_t v = 0; v < drop.size(); ++v) drop[v] = joins.small[static_cast<size_t>(borders.origins[v].component)];
+  stitcher.Drop(drop);
+  const size_t stitch_faces = stitcher.faces().size();
+  counts.holes_filled = stitcher.FillHoles(options.max_hole_steps);
+  counts.border_edges_after = stitcher.CountOpenEdges();
+
+  joins.faces = stitcher.faces();
+  std::vector<uint8_t> is_stitch(joins.faces.size(), 0);
+  std::fill(is_stitch.begin(), is_stitch.begin() + static_cast<int64_t>(stitch_faces), 1);
+  joins.offsets = SeamOffsets(borders, stitcher.vertices(), joins.faces, is_stitch);
+  for (size_t f = 0; f < joins.faces.size(); ++f) {
+    if (drop[static_cast<size_t>(joins.faces[f][0])] != 0) continue;
+    ++(is_stitch[f] != 0 ? counts.stitch_faces : counts.hole_faces);
+  }
+  std::erase_if(joins.faces, [&](const BorderStitcher::Face& face) { return drop[static_cast<size_t>(face[0])] != 0; });
+  joins.copies = SplitPoints(stitcher, joins.faces);
+  return joins;
+}
+
+// Writes parts one behind the other and remembers where their borders' vertices are.
+class PartWriter {
+ public:
+  PartWriter(const PartBorders& borders, const Joins& joins, PlyStreamWriter& writer)
+      : borders_(borders),
+        joins_(joins),
+        writer_(writer),
+        index_of_border_(borders.origins.size() + joins.copies.size(), 0),
+        is_copied_(borders.origins.size(), 0) {
+    for (const int32_t v : joins.copies) is_copied_[static_cast<size_t>(v)] = 1;
+  }
+
+  absl::Status Append(int64_t part, const FinishedPart& finished) {
+    const auto end = borders_.parts[static_cast<size_t>(part) + 1].first_border;
+    for (int32_t border = borders_.parts[static_cast<size_t>(part)].first_border; border < end; ++border) {
+      const auto v = static_cast<size_t>(border);
+      const int32_t at = finished.index[static_cast<size_t>(borders_.origins[v].vertex)];
+      if (at < 0) continue;
+      index_of_border_[v] = static_cast<uint32_t>(writer_.vertices() + at);
+      if (is_copied_[v] == 0) continue;
+      AppendVertex(finished.mesh, static_cast<size_t>(at), copied_vertices_);
+      copied_borders_.push_back(border);
+    }
+    return writer_.Append(finished.mesh);
+  }
+
+  // Once all parts are there.
+  absl::Status AppendJoins() {
+    TriangleMesh copies;
+    for (size_t c = 0; c < joins_.copies.size(); ++c) {
+      const auto at = std::ranges::lower_bound(copied_borders_, joins_.copies[c]) - copied_borders_.begin();
+      index_of_border_[borders_.origins.size() + c] = static_cast<uint32_t>(writer_.vertices() + c);
+      AppendVertex(copied_vertices_, static_cast<size_t>(at), copies);
+    }
+    MW_RETURN_IF_ERROR(writer_.Append(copies));
+    std::vector<std::array<uint32_t, 3>> faces;
+    faces.reserve(joins_.faces.size());
+    for (const auto& face : joins_.faces) {
+      std::array<uint32_t, 3>& corners = faces.emplace_back();
+      for (size_t k = 0; k < 3; ++k) corners[k] = index_of_border_[static_cast<size_t>(face[k])];
+    }
+    return writer_.AppendFaces(faces);
+  }
+
+ private:
+  const PartBorders& borders_;
+  const Joins& joins_;
+  PlyStreamWriter& writer_;
+  std::vector<uint32_t> index_of_border_;  // and of the copies, in the file
+  std::vector<uint8_t> is_copied_;
+  TriangleMesh copied_vertices_;
+  std::vector<int32_t> copied_borders_;  // ascending
+};
 
 }  // namespace
 
@@ -356,76 +307,43 @@ absl::Status JoinOptions::Validate() const {
 }
 
 absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurface& load, const JoinOptions& options,
-                                                 const std::string& path, ThreadPool& pool) {
+                                                 const std::string& path, ThreadPool& pool,
+                                                 const std::function<void()>& part_done) {
   MW_RETURN_IF_ERROR(options.Validate());
   JoinedMeshCounts counts;
-  MW_ASSIGN_OR_RETURN(Borders borders, LookAtParts(count, load, pool, counts));
-
-  BorderStitcher stitcher(std::move(borders.vertices), borders.inner_edges);
-  borders.inner_edges = {};
-  stitcher.Drop(LoneTriangles(borders));
-  stitcher.StitchNearby(kStitchReach);
-  const std::vector<uint8_t> small =
-      SmallComponents(borders, stitcher.faces(), options.min_component_faces, counts.components_removed);
-  std::vector<uint8_t> drop(borders.origins.size());
-  for (size_t v = 0; v < drop.size(); ++v) drop[v] = small[static_cast<size_t>(borders.origins[v].component)];
-  stitcher.Drop(drop);
-  const size_t stitch_faces = stitcher.faces().size();
-  counts.holes_filled = stitcher.FillHoles(options.max_hole_steps);
-  counts.border_edges_after = stitcher.CountOpenEdges();
-
-  std::vector<BorderStitcher::Face> faces = stitcher.faces();
-  std::vector<uint8_t> is_stitch(faces.size(), 0);
-  std::fill(is_stitch.begin(), is_stitch.begin() + static_cast<int64_t>(stitch_faces), 1);
-  const std::vector<std::optional<SeamOffset>> offsets = SeamOffsets(borders, stitcher.vertices(), faces, is_stitch);
-  for (size_t f = 0; f < faces.size(); ++f) {
-    if (drop[static_cast<size_t>(faces[f][0])] == 0) ++(is_stitch[f] != 0 ? counts.stitch_faces : counts.hole_faces);
+  MW_ASSIGN_OR_RETURN(PartBorders borders, FindPartBorders(count, load, pool, part_done));
+  counts.border_edges_before = static_cast<int64_t>(borders.vertices.size());
+  std::vector<int64_t> patches;
+  for (size_t i = 0; i < static_cast<size_t>(count); ++i) {
+    const std::vector<bool>& trimmed = borders.parts[i].trimmed;
+    patches.push_back(static_cast<int64_t>(trimmed.size()));
+    counts.patches_trimmed += std::ranges::count(trimmed, true);
   }
-  std::erase_if(faces, [&](const BorderStitcher::Face& face) { return drop[static_cast<size_t>(face[0])] != 0; });
-  const std::vector<int32_t> copies = SplitPoints(stitcher, faces);
+  const Joins joins = JoinBorders(borders, options, counts);
 
   MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, kAttributes));
-  std::vector<uint32_t> index_of_border(borders.origins.size() + copies.size(), 0);
-  std::vector<int32_t> copied(borders.origins.size(), 0);
-  for (const int32_t v : copies) ++copied[static_cast<size_t>(v)];
-  TriangleMesh copied_vertices;
-  std::vector<int32_t> copied_borders;
-  for (int64_t i = 0; i < count; ++i) {
-    const Part& part = borders.parts[static_cast<size_t>(i)];
-    MW_ASSIGN_OR_RETURN(PatchLattice surface, load(i));
-    const PartMesh part_mesh = BuildPartMesh(surface, RemovedNodes(surface, part.trimmed));
-    const auto end = static_cast<size_t>(borders.parts[static_cast<size_t>(i) + 1].first_border);
-    std::vector<SeamOffset> part_offsets;
-    for (auto v = static_cast<size_t>(part.first_border); v < end; ++v) {
-      if (offsets[v].has_value()) part_offsets.push_back(*offsets[v]);
+  PartWriter part_writer(borders, joins, writer);
+  for (const auto& [first, last] : BatchesOfParts(patches)) {
+    std::vector<FinishedPart> parts(static_cast<size_t>(last - first));
+    MW_RETURN_IF_ERROR(ForEachPart(first, last, pool, [&, first = first](int64_t i) -> absl::Status {
+      const PartBorders::Part& part = borders.parts[static_cast<size_t>(i)];
+      const auto end = borders.parts[static_cast<size_t>(i) + 1].first_border;
+      std::vector<SeamOffset> offsets;
+      for (int32_t v = part.first_border; v < end; ++v) {
+        const std::optional<SeamOffset>& offset = joins.offsets[static_cast<size_t>(v)];
+        if (offset.has_value()) offsets.push_back(*offset);
+      }
+      MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load(i));
+      parts[static_cast<size_t>(i - first)] =
+          FinishPart(*surface, part, joins.small.data() + part.first_component, offsets, options.blend_steps);
+      return absl::OkStatus();
+    }));
+    for (int64_t i = first; i < last; ++i) {
+      MW_RETURN_IF_ERROR(part_writer.Append(i, std::exchange(parts[static_cast<size_t>(i - first)], {})));
+      part_done();
     }
-    BlendSeams(part_offsets, options.blend_steps, surface);
-    std::vector<int32_t> index;
-    const TriangleMesh mesh = MeshOfPart(surface, part_mesh, small.data() + part.first_component, index);
-    for (auto v = static_cast<size_t>(part.first_border); v < end; ++v) {
-      const int32_t at = index[static_cast<size_t>(borders.origins[v].vertex)];
-      if (at < 0) continue;
-      index_of_border[v] = static_cast<uint32_t>(writer.vertices() + at);
-      if (copied[v] == 0) continue;
-      AppendVertex(mesh, static_cast<size_t>(at), copied_vertices);
-      copied_borders.push_back(static_cast<int32_t>(v));
-    }
-    MW_RETURN_IF_ERROR(writer.Append(mesh));
   }
-  TriangleMesh copy_mesh;
-  for (size_t c = 0; c < copies.size(); ++c) {
-    const auto at = std::ranges::lower_bound(copied_borders, copies[c]) - copied_borders.begin();
-    index_of_border[borders.origins.size() + c] = static_cast<uint32_t>(writer.vertices() + c);
-    AppendVertex(copied_vertices, static_cast<size_t>(at), copy_mesh);
-  }
-  MW_RETURN_IF_ERROR(writer.Append(copy_mesh));
-  std::vector<std::array<uint32_t, 3>> joining;
-  joining.reserve(faces.size());
-  for (const auto& face : faces) {
-    joining.push_back({index_of_border[static_cast<size_t>(face[0])], index_of_border[static_cast<size_t>(face[1])],
-                       index_of_border[static_cast<size_t>(face[2])]});
-  }
-  MW_RETURN_IF_ERROR(writer.AppendFaces(joining));
+  MW_RETURN_IF_ERROR(part_writer.AppendJoins());
   MW_RETURN_IF_ERROR(writer.Commit());
   counts.vertices = writer.vertices();
   counts.faces = writer.faces();

@@ -1,13 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include "common/base/thread_pool.h"
-#include "common/mesh/surface_union.h"
+#include "common/mesh/part_borders.h"
 
 namespace meshwright {
 
@@ -40,10 +41,11 @@ struct JoinedMeshCounts {
 // has one or two triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their
 // order alone, not on the threads.
 //
-// Loads each surface about twice, a few at a time, and keeps the vertices on borders of all of them (some 300 bytes
-// each, and 1/8 byte for each other patch). Errors: those of `load` or of PlyStreamWriter, InvalidArgument for options;
-// then no file appears.
-absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurface& load, const JoinOptions& options,
-                                                 const std::string& path, ThreadPool& pool);
+// Loads each surface a few times, a few of them at a time, and keeps the vertices on borders of all of them (some 300
+// bytes each, and 1/4 byte for each patch). `part_done` is called twice per surface, one call at a time. Errors: those
+// of `load` or of PlyStreamWriter, InvalidArgument for options; then no file appears.
+absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(
+    int64_t count, const LoadSurface& load, const JoinOptions& options, const std::string& path, ThreadPool& pool,
+    const std::function<void()>& part_done = [] {});
 
 }  // namespace meshwright

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "common/base/files.h"
 #include "common/mesh/disjoint_sets.h"
 #include "common/mesh/ply.h"
+#include "common/mesh/surface_mesh.h"
 #include "common/surface/random_surface_testing.h"
 
 namespace meshwright {
@@ -67,6 +69,10 @@ PatchLattice PlaneSeenBy(CameraIndex index, const Camera& camera, const Keep& ke
     }
   }
   return surface;
+}
+
+std::shared_ptr<const SparseSurface> Sparse(const PatchLattice& surface) {
+  return std::make_shared<const SparseSurface>(SparseSurface::From(surface));
 }
 
 bool Everywhere(double, double) { return true; }
@@ -141,8 +147,8 @@ class JoinedMeshTest : public testing::Test {
   TriangleMesh Join(const std::vector<PatchLattice>& surfaces, const JoinOptions& options, int threads = 1) {
     ThreadPool pool(threads);
     const auto counts = WriteJoinedMesh(
-        static_cast<int64_t>(surfaces.size()), [&](int64_t i) { return surfaces[static_cast<size_t>(i)]; }, options,
-        Path(), pool);
+        static_cast<int64_t>(surfaces.size()), [&](int64_t i) { return Sparse(surfaces[static_cast<size_t>(i)]); },
+        options, Path(), pool);
     EXPECT_TRUE(counts.ok()) << counts.status();
     if (!counts.ok()) return {};
     counts_ = *counts;
@@ -327,9 +333,9 @@ TEST_F(JoinedMeshTest, NothingAcceptedIsAnEmptyMesh) {
 
 TEST_F(JoinedMeshTest, SurfaceThatCannotBeLoadedLeavesNoFile) {
   ThreadPool pool(1);
-  const auto load = [&](int64_t i) -> absl::StatusOr<PatchLattice> {
+  const auto load = [&](int64_t i) -> absl::StatusOr<std::shared_ptr<const SparseSurface>> {
     if (i == 2) return absl::DataLossError("surface 2 is damaged");
-    return PlaneSeenBy(0, left_, Everywhere);
+    return Sparse(PlaneSeenBy(0, left_, Everywhere));
   };
   EXPECT_EQ(WriteJoinedMesh(3, load, {}, Path(), pool).status(), absl::DataLossError("surface 2 is damaged"));
   EXPECT_TRUE(fs::is_empty(folder_));

@@ -1,11 +1,14 @@
 #include <filesystem>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include <benchmark/benchmark.h>
 
 #include "common/base/check.h"
+#include "common/mesh/joined_mesh.h"
 #include "common/mesh/ply.h"
-#include "common/mesh/surface_union.h"
+#include "common/mesh/surface_mesh.h"
 #include "common/surface/random_surface_testing.h"
 
 namespace meshwright {
@@ -15,21 +18,29 @@ std::string BenchmarkPath() {
   return (std::filesystem::temp_directory_path() / "meshwright_mesh_benchmark.ply").string();
 }
 
-// Four surfaces of 1.5 M patches each.
-void BM_WriteSurfaceUnion(benchmark::State& state) {
-  const PatchLattice surface = RandomSurface(1, SmallCamera(1536, 1024), 1, 0.97, 0.98);
-  int64_t bytes = 0;
-  for (auto _ : state) {
-    MW_CHECK(WriteSurfaceUnion(
-                 4, [&](int64_t) { return surface; }, BenchmarkPath())
-                 .ok());
-    bytes += static_cast<int64_t>(std::filesystem::file_size(BenchmarkPath()));
+// Four surfaces of 0.4 M patches each, of the same plane seen from places apart.
+void BM_WriteJoinedMesh(benchmark::State& state) {
+  std::vector<std::shared_ptr<const SparseSurface>> surfaces;
+  for (int i = 0; i < 4; ++i) {
+    Camera camera = SmallCamera(768, 512);
+    camera.cam_from_world.translation.x() += 0.7 * i;
+    PatchLattice surface = RandomSurface(static_cast<uint32_t>(i), camera, 1, 0.99, 0.99);
+    for (float& depth : surface.depth) depth = depth > 0 ? 2 + 0.001F * depth : 0;
+    for (auto& normal : surface.normal_in_world) normal = -camera.viewing_direction_in_world().cast<float>();
+    surfaces.push_back(std::make_shared<const SparseSurface>(SparseSurface::From(surface)));
   }
-  state.SetBytesProcessed(bytes);
-  state.SetItemsProcessed(4 * surface.CountPatches() * state.iterations());
+  ThreadPool pool(1);
+  int64_t vertices = 0;
+  for (auto _ : state) {
+    const auto counts = WriteJoinedMesh(
+        4, [&](int64_t i) { return surfaces[static_cast<size_t>(i)]; }, {}, BenchmarkPath(), pool);
+    MW_CHECK(counts.ok());
+    vertices += counts->vertices;
+  }
+  state.SetItemsProcessed(vertices);
   std::filesystem::remove(BenchmarkPath());
 }
-BENCHMARK(BM_WriteSurfaceUnion)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_WriteJoinedMesh)->Unit(benchmark::kMillisecond);
 
 void BM_ReadPly(benchmark::State& state) {
   MW_CHECK(WriteSurfacePart(RandomSurface(1, SmallCamera(1536, 1024), 1, 0.97, 0.98), BenchmarkPath()).ok());

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/surface/patch_lattice.h"
+#include "common/surface/sparse_surface.h"
 
 namespace meshwright {
 
@@ -13,14 +13,14 @@ namespace meshwright {
 struct PartMesh {
   static constexpr int32_t kInterior = -1;
 
-  std::vector<int32_t> node_of_vertex;        // ascending
+  std::vector<int32_t> patch_of_vertex;       // ascending
   std::vector<std::array<int32_t, 3>> faces;  // vertices, counter-clockwise seen from the camera
   std::vector<int32_t> next_on_border;        // per vertex: where the border goes on, the triangle to its left
   std::vector<int32_t> component_of_vertex;   // numbered by their first vertices
   std::vector<int64_t> faces_of_component;
 };
 
-// Triangles of the surface that touch no node that `removed` (one entry per node) marks.
-PartMesh BuildPartMesh(const PatchLattice& surface, const std::vector<uint8_t>& removed);
+// Triangles of the surface that touch no patch that `removed` (one entry per patch) marks.
+PartMesh BuildPartMesh(const SparseSurface& surface, const std::vector<uint8_t>& removed);
 
 }  // namespace meshwright

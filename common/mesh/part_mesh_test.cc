@@ -11,22 +11,22 @@
 namespace meshwright {
 namespace {
 
-TEST(PartMeshTest, HasTheSurfacesTrianglesThatTouchNoRemovedNode) {
+TEST(PartMeshTest, HasTheSurfacesTrianglesThatTouchNoRemovedPatch) {
   for (uint32_t seed = 0; seed < 20; ++seed) {
-    const PatchLattice surface = RandomSurface(seed, SmallCamera(23, 17), 1, 0.8, 0.8);
-    std::vector<uint8_t> removed(surface.depth.size(), 0);
-    for (size_t node = seed; node < removed.size(); node += 7) removed[node] = 1;
+    const SparseSurface surface = SparseSurface::From(RandomSurface(seed, SmallCamera(23, 17), 1, 0.8, 0.8));
+    std::vector<uint8_t> removed(surface.patches(), 0);
+    for (size_t patch = seed; patch < removed.size(); patch += 7) removed[patch] = 1;
     const PartMesh mesh = BuildPartMesh(surface, removed);
     std::vector<std::array<int32_t, 3>> expected;
-    for (const auto& triangle : TriangulateLattice(surface)) {
-      const auto gone = [&](int32_t node) { return removed[static_cast<size_t>(node)] != 0; };
+    for (const auto& triangle : Triangulate(surface)) {
+      const auto gone = [&](int32_t patch) { return removed[static_cast<size_t>(patch)] != 0; };
       if (!gone(triangle[0]) && !gone(triangle[1]) && !gone(triangle[2])) expected.push_back(triangle);
     }
     std::vector<std::array<int32_t, 3>> found;
     for (const auto& face : mesh.faces) {
-      found.push_back({mesh.node_of_vertex[static_cast<size_t>(face[0])],
-                       mesh.node_of_vertex[static_cast<size_t>(face[1])],
-                       mesh.node_of_vertex[static_cast<size_t>(face[2])]});
+      found.push_back({mesh.patch_of_vertex[static_cast<size_t>(face[0])],
+                       mesh.patch_of_vertex[static_cast<size_t>(face[1])],
+                       mesh.patch_of_vertex[static_cast<size_t>(face[2])]});
     }
     EXPECT_EQ(found, expected);
   }
@@ -34,8 +34,8 @@ TEST(PartMeshTest, HasTheSurfacesTrianglesThatTouchNoRemovedNode) {
 
 TEST(PartMeshTest, BorderIsTheEdgesWithOneTriangleInSimpleLoops) {
   for (uint32_t seed = 0; seed < 20; ++seed) {
-    const PatchLattice surface = RandomSurface(seed, SmallCamera(23, 17), 1, 0.75, 0.85);
-    const PartMesh mesh = BuildPartMesh(surface, std::vector<uint8_t>(surface.depth.size(), 0));
+    const SparseSurface surface = SparseSurface::From(RandomSurface(seed, SmallCamera(23, 17), 1, 0.75, 0.85));
+    const PartMesh mesh = BuildPartMesh(surface, std::vector<uint8_t>(surface.patches(), 0));
     std::set<std::pair<int32_t, int32_t>> edges;
     for (const auto& face : mesh.faces) {
       for (size_t k = 0; k < 3; ++k) EXPECT_TRUE(edges.emplace(face[k], face[(k + 1) % 3]).second);
@@ -57,8 +57,8 @@ TEST(PartMeshTest, BorderIsTheEdgesWithOneTriangleInSimpleLoops) {
 
 TEST(PartMeshTest, ComponentsAreWhatEdgesConnect) {
   for (uint32_t seed = 0; seed < 10; ++seed) {
-    const PatchLattice surface = RandomSurface(seed, SmallCamera(23, 17), 1, 0.6, 0.8);
-    const PartMesh mesh = BuildPartMesh(surface, std::vector<uint8_t>(surface.depth.size(), 0));
+    const SparseSurface surface = SparseSurface::From(RandomSurface(seed, SmallCamera(23, 17), 1, 0.6, 0.8));
+    const PartMesh mesh = BuildPartMesh(surface, std::vector<uint8_t>(surface.patches(), 0));
     std::vector<int64_t> faces(mesh.faces_of_component.size(), 0);
     for (const auto& face : mesh.faces) {
       const int32_t component = mesh.component_of_vertex[static_cast<size_t>(face[0])];

@@ -18,39 +18,45 @@ void AddTo(std::array<uint8_t, 3>& rgb, const Eigen::Vector3f& offset) {
 
 }  // namespace
 
-void BlendSeams(const std::vector<SeamOffset>& offsets, int steps, PatchLattice& surface) {
+void BlendSeams(const std::vector<SeamOffset>& offsets, int steps, const SparseSurface& surface,
+                std::vector<std::array<uint8_t, 3>>& colors) {
   if (offsets.empty() || steps == 0) return;
-  std::vector<int32_t> ring_of_node(surface.depth.size(), 0);  // 0: not reached, 1: on the seam
+  std::vector<int32_t> ring_of_patch(surface.patches(), 0);  // 0: not reached, 1: on the seam
   std::vector<std::pair<int32_t, Eigen::Vector3f>> ring;
-  std::vector<int32_t> entry_of_node(surface.depth.size(), 0);  // position in its ring, where it has one
+  std::vector<int32_t> entry_of_patch(surface.patches(), 0);  // position in its ring, where it has one
   for (const SeamOffset& seam : offsets) {
-    const auto node = static_cast<size_t>(seam.node);
-    if (ring_of_node[node] != 0) continue;  // several vertices in one patch: the first one speaks
-    ring_of_node[node] = 1;
-    entry_of_node[node] = static_cast<int32_t>(ring.size());
-    ring.emplace_back(seam.node, seam.color);
+    const auto patch = static_cast<size_t>(seam.patch);
+    if (ring_of_patch[patch] != 0) continue;  // several vertices in one patch: the first one speaks
+    ring_of_patch[patch] = 1;
+    entry_of_patch[patch] = static_cast<int32_t>(ring.size());
+    ring.emplace_back(seam.patch, seam.color);
   }
+  const PatchFinder finder(surface);
   const int32_t columns = surface.lattice.columns;
-  const auto for_each_linked = [&](int32_t node, const auto& visit) {
-    const uint8_t links = surface.links[static_cast<size_t>(node)];
-    if ((links & PatchLattice::kLinkRight) != 0) visit(node + 1);
-    if ((links & PatchLattice::kLinkDown) != 0) visit(node + columns);
-    if (node % columns > 0 && (surface.links[static_cast<size_t>(node - 1)] & PatchLattice::kLinkRight) != 0) {
-      visit(node - 1);
+  const auto is_linked = [&](int32_t patch, uint8_t link) {
+    return (surface.links[static_cast<size_t>(patch)] & link) != 0;
+  };
+  const auto for_each_linked = [&](int32_t patch, const auto& visit) {
+    const int32_t node = surface.node[static_cast<size_t>(patch)];
+    if (is_linked(patch, PatchLattice::kLinkRight)) visit(patch + 1);
+    if (is_linked(patch, PatchLattice::kLinkDown)) visit(finder.At(node + columns));
+    if (node % columns > 0 && finder.At(node - 1) >= 0 && is_linked(patch - 1, PatchLattice::kLinkRight)) {
+      visit(patch - 1);
     }
-    if (node >= columns && (surface.links[static_cast<size_t>(node - columns)] & PatchLattice::kLinkDown) != 0) {
-      visit(node - columns);
+    if (node >= columns) {
+      const int32_t above = finder.At(node - columns);
+      if (above >= 0 && is_linked(above, PatchLattice::kLinkDown)) visit(above);
     }
   };
   std::vector<std::pair<int32_t, Eigen::Vector3f>> next_ring;
   for (int32_t k = 1; k <= steps; ++k) {
     next_ring.clear();
-    for (const auto& [node, offset] : ring) {
-      for_each_linked(node, [&](int32_t neighbour) {
-        auto& reached = ring_of_node[static_cast<size_t>(neighbour)];
+    for (const auto& [patch, offset] : ring) {
+      for_each_linked(patch, [&](int32_t neighbour) {
+        auto& reached = ring_of_patch[static_cast<size_t>(neighbour)];
         if (reached != 0) return;
         reached = k + 1;
-        entry_of_node[static_cast<size_t>(neighbour)] = static_cast<int32_t>(next_ring.size());
+        entry_of_patch[static_cast<size_t>(neighbour)] = static_cast<int32_t>(next_ring.size());
         next_ring.emplace_back(neighbour, Eigen::Vector3f::Zero());
       });
     }
@@ -58,14 +64,14 @@ void BlendSeams(const std::vector<SeamOffset>& offsets, int steps, PatchLattice&
       Eigen::Vector3f sum = Eigen::Vector3f::Zero();
       float weight = 0;
       for_each_linked(entry.first, [&](int32_t neighbour) {
-        if (ring_of_node[static_cast<size_t>(neighbour)] != k) return;
-        sum += ring[static_cast<size_t>(entry_of_node[static_cast<size_t>(neighbour)])].second;
+        if (ring_of_patch[static_cast<size_t>(neighbour)] != k) return;
+        sum += ring[static_cast<size_t>(entry_of_patch[static_cast<size_t>(neighbour)])].second;
         weight += 1;
       });
       entry.second = sum / weight;
     }
     const float fade = static_cast<float>(steps + 1 - k) / static_cast<float>(steps);
-    for (const auto& [node, offset] : ring) AddTo(surface.rgb[static_cast<size_t>(node)], offset * fade);
+    for (const auto& [patch, offset] : ring) AddTo(colors[static_cast<size_t>(patch)], offset * fade);
     std::swap(ring, next_ring);
   }
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
 #include "common/base/check.h"
 #include "common/geometry/level_of_detail.h"
@@ -13,41 +12,44 @@ namespace meshwright {
 namespace {
 
 constexpr int kTile = 16;  // nodes
-constexpr int64_t kRowsAtOnce = 8;
+constexpr int64_t kPatchesAtOnce = 8192;
 constexpr float kMinNormalCosine = 0.5F;  // 60 degrees
 
 }  // namespace
 
-SurfaceOutline::SurfaceOutline(const PatchLattice& surface)
+SurfaceOutline::SurfaceOutline(const SparseSurface& surface)
     : camera_(surface.camera),
       lattice_(surface.lattice),
       tile_columns_((lattice_.columns + kTile - 1) / kTile),
       tile_rows_((lattice_.rows + kTile - 1) / kTile),
       nearest_(static_cast<size_t>(tile_columns_) * tile_rows_, 0.0F),
       farthest_(nearest_.size(), 0.0F) {
-  std::vector<Eigen::Vector3d> points;
-  size_t tile = 0;
-  for (int tile_row = 0; tile_row < tile_rows_; ++tile_row) {
-    for (int tile_column = 0; tile_column < tile_columns_; ++tile_column, ++tile) {
-      points.clear();
-      for (int row = kTile * tile_row; row < std::min(kTile * (tile_row + 1), lattice_.rows); ++row) {
-        for (int column = kTile * tile_column; column < std::min(kTile * (tile_column + 1), lattice_.columns);
-             ++column) {
-          const float depth = surface.depth[static_cast<size_t>(lattice_.Index(column, row))];
-          if (!(depth > 0)) continue;
-          nearest_[tile] = points.empty() ? depth : std::min(nearest_[tile], depth);
-          farthest_[tile] = std::max(farthest_[tile], depth);
-          points.push_back(surface.Point(column, row));
-        }
-      }
-      if (points.empty()) continue;
-      Eigen::Vector3d center = Eigen::Vector3d::Zero();
-      for (const Eigen::Vector3d& x : points) center += x / static_cast<double>(points.size());
-      double squared_radius = 0;
-      for (const Eigen::Vector3d& x : points) squared_radius = std::max(squared_radius, (x - center).squaredNorm());
-      balls_.push_back({center.cast<float>(), static_cast<float>(1.01 * std::sqrt(squared_radius))});
+  std::vector<std::vector<Eigen::Vector3d>> points(static_cast<size_t>(tile_columns_));  // of one row of tiles
+  size_t patch = 0;
+  for (int tile_row = 0; tile_row < tile_rows_ && patch < surface.patches(); ++tile_row) {
+    const int64_t end = lattice_.Index(0, std::min(kTile * (tile_row + 1), lattice_.rows));
+    for (; patch < surface.patches() && surface.node[patch] < end; ++patch) {
+      const int tile_column = surface.Column(patch) / kTile;
+      const size_t tile = static_cast<size_t>(tile_row) * tile_columns_ + tile_column;
+      const float depth = surface.depth[patch];
+      nearest_[tile] = nearest_[tile] > 0 ? std::min(nearest_[tile], depth) : depth;
+      farthest_[tile] = std::max(farthest_[tile], depth);
+      points[static_cast<size_t>(tile_column)].push_back(surface.Point(patch));
+    }
+    for (std::vector<Eigen::Vector3d>& in_tile : points) {
+      if (in_tile.empty()) continue;
+      balls_.push_back(BallAround(in_tile));
+      in_tile.clear();
     }
   }
+}
+
+SurfaceOutline::Ball SurfaceOutline::BallAround(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& x : points) center += x / static_cast<double>(points.size());
+  double squared_radius = 0;
+  for (const Eigen::Vector3d& x : points) squared_radius = std::max(squared_radius, (x - center).squaredNorm());
+  return {center.cast<float>(), static_cast<float>(1.01 * std::sqrt(squared_radius))};
 }
 
 bool SurfaceOutline::MayContain(const Ball& ball, double margin_steps) const {
@@ -79,43 +81,43 @@ bool SurfaceOutline::MayOverlap(const SurfaceOutline& other, double margin_steps
   return std::ranges::any_of(balls_, [&](const Ball& ball) { return other.MayContain(ball, margin_steps); });
 }
 
-CoveringSurface::CoveringSurface(PatchLattice moved) : surface(std::move(moved)) {
-  in_triangle.assign(surface.depth.size(), 0);
-  for (const auto& triangle : TriangulateLattice(surface)) {
-    for (const int32_t node : triangle) in_triangle[static_cast<size_t>(node)] = 1;
+std::vector<bool> CornersOfTriangles(const SparseSurface& surface) {
+  std::vector<bool> in_triangle(surface.patches(), false);
+  for (const auto& triangle : Triangulate(surface)) {
+    for (const int32_t patch : triangle) in_triangle[static_cast<size_t>(patch)] = true;
   }
+  return in_triangle;
 }
 
-void MarkCovered(const PatchLattice& surface, const CoveringSurface& cover, double margin_steps, ThreadPool& pool,
-                 std::vector<uint8_t>& removed) {
-  MW_CHECK(removed.size() == surface.depth.size());
-  const PatchLattice& other = cover.surface;
-  const auto covers = [&](int column, int row, size_t node) {
-    const Eigen::Vector3d x = surface.Point(column, row);
-    const Eigen::Vector3d x_in_cam = other.camera.CamFromWorld(x);
+void MarkCovered(const SparseSurface& surface, const SparseSurface& cover, const std::vector<bool>& in_triangle,
+                 double margin_steps, ThreadPool& pool, std::vector<uint8_t>& removed) {
+  MW_CHECK(removed.size() == surface.patches() && in_triangle.size() == cover.patches());
+  const PatchFinder finder(cover);
+  const auto is_covered = [&](size_t patch) {
+    const Eigen::Vector3d x = surface.Point(patch);
+    const Eigen::Vector3d x_in_cam = cover.camera.CamFromWorld(x);
     if (!(x_in_cam.z() > 0)) return false;
-    const Eigen::Vector2d at = other.lattice.FromPixel(other.camera.ProjectFromCam(x_in_cam));
-    if (!(at.x() > -0.5 && at.y() > -0.5 && at.x() < other.lattice.columns && at.y() < other.lattice.rows)) {
+    const Eigen::Vector2d at = cover.lattice.FromPixel(cover.camera.ProjectFromCam(x_in_cam));
+    if (!(at.x() > -0.5 && at.y() > -0.5 && at.x() < cover.lattice.columns && at.y() < cover.lattice.rows)) {
       return false;
     }
-    const int other_column = static_cast<int>(std::floor(at.x() + 0.5));
-    const int other_row = static_cast<int>(std::floor(at.y() + 0.5));
-    if (!other.lattice.Contains(other_column, other_row)) return false;
-    const auto other_node = static_cast<size_t>(other.lattice.Index(other_column, other_row));
-    if (cover.in_triangle[other_node] == 0) return false;
-    const Eigen::Vector3f& normal = other.normal_in_world[other_node];
-    if (!(normal.dot(surface.normal_in_world[node]) > kMinNormalCosine)) return false;
+    const int column = static_cast<int>(std::floor(at.x() + 0.5));
+    const int row = static_cast<int>(std::floor(at.y() + 0.5));
+    if (!cover.lattice.Contains(column, row)) return false;
+    const int32_t found = finder.At(cover.lattice.Index(column, row));
+    if (found == PatchFinder::kNone) return false;
+    const auto other = static_cast<size_t>(found);
+    if (!in_triangle[other]) return false;
+    const Eigen::Vector3f& normal = cover.normal_in_world[other];
+    if (!(normal.dot(surface.normal_in_world[patch]) > kMinNormalCosine)) return false;
     const double margin =
-        margin_steps * std::max(LevelOfDetail(surface.camera, surface.depth[node], surface.lattice.step),
-                                LevelOfDetail(other.camera, other.depth[other_node], other.lattice.step));
-    return std::abs((x - other.Point(other_column, other_row)).dot(normal.cast<double>())) < margin;
+        margin_steps * std::max(LevelOfDetail(surface.camera, surface.depth[patch], surface.lattice.step),
+                                LevelOfDetail(cover.camera, cover.depth[other], cover.lattice.step));
+    return std::abs((x - cover.Point(other)).dot(normal.cast<double>())) < margin;
   };
-  pool.ParallelFor(surface.lattice.rows, kRowsAtOnce, [&](int64_t begin, int64_t end) {
-    for (int row = static_cast<int>(begin); row < end; ++row) {
-      for (int column = 0; column < surface.lattice.columns; ++column) {
-        const auto node = static_cast<size_t>(surface.lattice.Index(column, row));
-        if (surface.depth[node] > 0 && removed[node] == 0 && covers(column, row, node)) removed[node] = 1;
-      }
+  pool.ParallelFor(static_cast<int64_t>(removed.size()), kPatchesAtOnce, [&](int64_t begin, int64_t end) {
+    for (auto patch = static_cast<size_t>(begin); patch < static_cast<size_t>(end); ++patch) {
+      if (removed[patch] == 0 && is_covered(patch)) removed[patch] = 1;
     }
   });
 }

@@ -6,14 +6,14 @@
 #include <Eigen/Core>
 
 #include "common/base/thread_pool.h"
-#include "common/surface/patch_lattice.h"
+#include "common/surface/sparse_surface.h"
 
 namespace meshwright {
 
 // Where an accepted surface lies, in tiles of its lattice: little enough to keep for all surfaces at once.
 class SurfaceOutline {
  public:
-  explicit SurfaceOutline(const PatchLattice& surface);
+  explicit SurfaceOutline(const SparseSurface& surface);
 
   // False only if no patch of this surface lies within `margin_steps` lattice steps of `other` on other's rays.
   bool MayOverlap(const SurfaceOutline& other, double margin_steps) const;
@@ -23,6 +23,7 @@ class SurfaceOutline {
     Eigen::Vector3f center_in_world;
     float radius;
   };
+  static Ball BallAround(const std::vector<Eigen::Vector3d>& points);
   bool MayContain(const Ball& ball, double margin_steps) const;
 
   Camera camera_;
@@ -34,19 +35,14 @@ class SurfaceOutline {
   std::vector<Ball> balls_;
 };
 
-// An accepted surface that others may have to give way to.
-struct CoveringSurface {
-  explicit CoveringSurface(PatchLattice surface);
+// Per patch: it is the corner of a triangle.
+std::vector<bool> CornersOfTriangles(const SparseSurface& surface);
 
-  PatchLattice surface;
-  std::vector<uint8_t> in_triangle;  // per node: it is the corner of a triangle
-};
-
-// Marks in `removed` (one entry per node of `surface`) each patch that `cover` shows too: the node of `cover` nearest
-// to its projection is the corner of a triangle, its plane passes within `margin_steps` d of the patch (d of section
-// 3.3, Jancosek et al. 2009, the coarser one), and the normals differ by less than 60 degrees. Both sides of a thin
-// wall stay.
-void MarkCovered(const PatchLattice& surface, const CoveringSurface& cover, double margin_steps, ThreadPool& pool,
-                 std::vector<uint8_t>& removed);
+// Marks in `removed` (one entry per patch of `surface`) each patch that `cover` shows too: the node of `cover` nearest
+// to its projection is the corner of a triangle (`in_triangle`, as CornersOfTriangles says), its plane passes within
+// `margin_steps` d of the patch (d of section 3.3, Jancosek et al. 2009, the coarser one), and the normals differ by
+// less than 60 degrees. Both sides of a thin wall stay.
+void MarkCovered(const SparseSurface& surface, const SparseSurface& cover, const std::vector<bool>& in_triangle,
+                 double margin_steps, ThreadPool& pool, std::vector<uint8_t>& removed);
 
 }  // namespace meshwright

@@ -30,6 +30,17 @@ PatchLattice Sheet(uint32_t seed, const Camera& camera, double density) {
   return surface;
 }
 
+// Per patch of `surface`.
+std::vector<uint8_t> Covered(const PatchLattice& surface, const PatchLattice& cover, ThreadPool& pool) {
+  const SparseSurface sparse = SparseSurface::From(surface);
+  const SparseSurface sparse_cover = SparseSurface::From(cover);
+  std::vector<uint8_t> removed(sparse.patches(), 0);
+  MarkCovered(sparse, sparse_cover, CornersOfTriangles(sparse_cover), 3, pool, removed);
+  return removed;
+}
+
+SurfaceOutline OutlineOf(const PatchLattice& surface) { return SurfaceOutline(SparseSurface::From(surface)); }
+
 TEST(SurfaceOverlapTest, OutlinesMissNoOverlap) {
   ThreadPool pool(1);
   int overlaps = 0;
@@ -39,9 +50,8 @@ TEST(SurfaceOverlapTest, OutlinesMissNoOverlap) {
     const PatchLattice first = Sheet(seed, camera, 0.1 + 0.01 * seed);
     const PatchLattice second =
         Sheet(seed + 100, Turned(camera, 0.03 * (seed % 40), {0.06 * seed, 0, 0.01 * seed}), 0.3);
-    std::vector<uint8_t> removed(second.depth.size(), 0);
-    MarkCovered(second, CoveringSurface(first), 3, pool, removed);
-    const bool may_overlap = SurfaceOutline(second).MayOverlap(SurfaceOutline(first), 3);
+    const std::vector<uint8_t> removed = Covered(second, first, pool);
+    const bool may_overlap = OutlineOf(second).MayOverlap(OutlineOf(first), 3);
     if (std::ranges::count(removed, 1) > 0) {
       EXPECT_TRUE(may_overlap) << seed;
       ++overlaps;
@@ -55,22 +65,18 @@ TEST(SurfaceOverlapTest, OutlinesMissNoOverlap) {
 TEST(SurfaceOverlapTest, SurfaceCoversItselfWhereItHasTriangles) {
   ThreadPool pool(2);
   const PatchLattice surface = Sheet(3, SmallCamera(50, 40), 0.7);
-  const CoveringSurface cover(surface);
-  std::vector<uint8_t> removed(surface.depth.size(), 0);
-  MarkCovered(surface, cover, 3, pool, removed);
-  EXPECT_EQ(removed, cover.in_triangle);
+  const std::vector<bool> in_triangle = CornersOfTriangles(SparseSurface::From(surface));
+  EXPECT_EQ(Covered(surface, surface, pool), std::vector<uint8_t>(in_triangle.begin(), in_triangle.end()));
 }
 
 TEST(SurfaceOverlapTest, PatchesTooFarFromThePlaneOrTurnedAwayStay) {
   ThreadPool pool(1);
   const Camera camera = SmallCamera(50, 40);
-  const CoveringSurface cover(Sheet(1, camera, 1));
+  const PatchLattice cover = Sheet(1, camera, 1);
   const auto covered = [&](const PatchLattice& surface) {
-    std::vector<uint8_t> removed(surface.depth.size(), 0);
-    MarkCovered(surface, cover, 3, pool, removed);
-    return std::ranges::count(removed, 1);
+    return std::ranges::count(Covered(surface, cover, pool), 1);
   };
-  PatchLattice surface = cover.surface;
+  PatchLattice surface = cover;
   const int64_t all = covered(surface);
   EXPECT_EQ(all, surface.CountPatches());
   const float step = 2.1F / static_cast<float>(camera.focal());
@@ -78,7 +84,7 @@ TEST(SurfaceOverlapTest, PatchesTooFarFromThePlaneOrTurnedAwayStay) {
   EXPECT_EQ(covered(surface), all);
   for (float& depth : surface.depth) depth += 1.5F * step;
   EXPECT_EQ(covered(surface), 0);
-  surface = cover.surface;
+  surface = cover;
   for (auto& normal : surface.normal_in_world) normal = -normal;
   EXPECT_EQ(covered(surface), 0);
 }

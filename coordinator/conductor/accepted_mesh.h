@@ -16,10 +16,10 @@ namespace meshwright {
 
 absl::StatusOr<PatchLattice> LoadAcceptedSurface(BlobStore& blobs, const AcceptedSurface& surface);
 
-// The last step of a reconstruction: the mesh of its accepted surfaces, in the order of their commits. `loading`, when
-// given, is called before each surface is loaded, each at least twice.
-absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(const std::vector<AcceptedSurface>& surfaces, BlobStore& blobs,
-                                                   const JoinOptions& options, const std::string& path,
-                                                   ThreadPool& pool, const std::function<void()>& loading = nullptr);
+// The last step of a reconstruction: the mesh of its accepted surfaces, in the order of their commits. `part_done`
+// is called twice per surface, one call at a time, on any thread.
+absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(
+    const std::vector<AcceptedSurface>& surfaces, BlobStore& blobs, const JoinOptions& options, const std::string& path,
+    ThreadPool& pool, const std::function<void()>& part_done = [] {});
 
 }  // namespace meshwright

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "common/base/thread_pool.h"
+#include "common/mesh/border_stitching.h"
+#include "common/surface/sparse_surface.h"
+
+namespace meshwright {
+
+// Gives surface `index` of those that make up the mesh; each is asked for several times. Called by several threads at
+// the same time.
+using LoadSurface = std::function<absl::StatusOr<std::shared_ptr<const SparseSurface>>(int64_t index)>;
+
+struct BorderOrigin {
+  int32_t vertex = 0;     // of its part
+  int32_t patch = 0;      // of its surface
+  int32_t component = 0;  // of all parts
+  std::array<uint8_t, 3> color = {};
+};
+
+// What is kept of every part while all are joined: where it is trimmed, and its border.
+struct PartBorders {
+  struct Part {
+    std::vector<bool> trimmed;    // per patch
+    int32_t first_border = 0;     // of its vertices below
+    int32_t first_component = 0;  // of its components
+  };
+  std::vector<Part> parts;  // and one more, which holds the ends
+  std::vector<BorderVertex> vertices;
+  std::vector<BorderOrigin> origins;
+  std::vector<std::pair<int32_t, int32_t>> inner_edges;
+  std::vector<int64_t> faces_of_component;
+};
+
+// Trims accepted surfaces 0 .. count - 1 where an earlier one shows the same and finds the borders of what is left.
+// `looked_at` is called once per surface, one call at a time. Errors: those of `load`.
+absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& load, ThreadPool& pool,
+                                            const std::function<void()>& looked_at);
+
+// Calls body(i) for first .. last - 1 on all threads. The error of the lowest i, once all are done.
+absl::Status ForEachPart(int64_t first, int64_t last, ThreadPool& pool,
+                         const std::function<absl::Status(int64_t i)>& body);
+
+// Consecutive ranges [first, second) of parts small enough to be worked on at the same time, of `patches` each.
+std::vector<std::pair<int64_t, int64_t>> BatchesOfParts(const std::vector<int64_t>& patches);
+
+}  // namespace meshwright
