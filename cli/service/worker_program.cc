@@ -1,17 +1,16 @@
 #include "cli/service/worker_program.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
-#include <absl/time/clock.h>
 #include <unistd.h>
 
 #include "cli/service/open_stores.h"
 #include "cli/service/parse_method.h"
 #include "common/base/clock.h"
 #include "common/base/status_macros.h"
+#include "common/telemetry/log.h"
 #include "common/telemetry/measured_blob_store.h"
 #include "common/telemetry/metrics.h"
 #include "common/telemetry/metrics_server.h"
@@ -37,6 +36,7 @@ class RealWorkerProgram final : public WorkerProgram {
   RealWorkerProgram(const WorkerSettings& settings, std::unique_ptr<GrpcCoordinator> coordinator,
                     std::unique_ptr<BlobStore> shared_blobs)
       : id_(settings.id.empty() ? DefaultId() : settings.id),
+        log_(Logger::ToStderr().With({{"worker", id_}})),
         coordinator_(std::move(coordinator)),
         shared_blobs_(std::move(shared_blobs)),
         metrics_("worker"),
@@ -52,7 +52,7 @@ class RealWorkerProgram final : public WorkerProgram {
             [](const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
               return RunCameraJob(input, options, pool);
             },
-            [this](const std::string& line) { Log(line); }) {}
+            log_) {}
 
   absl::Status ServeMetrics(const std::string& address) {
     MW_ASSIGN_OR_RETURN(metrics_server_, MetricsServer::Start(address, metrics_, [this] { return channel_.Ready(); }));
@@ -62,17 +62,13 @@ class RealWorkerProgram final : public WorkerProgram {
   void Run() override { agent_.Run(); }
   int metrics_port() const override { return metrics_server_ != nullptr ? metrics_server_->port() : 0; }
   void Drain() override {
-    Log("draining");
+    log_.Info("draining");
     agent_.Drain();
   }
 
  private:
-  void Log(const std::string& line) const {
-    const std::string time = absl::FormatTime("%Y-%m-%dT%H:%M:%E3SZ", absl::Now(), absl::UTCTimeZone());
-    std::fprintf(stderr, "%s worker=%s %s\n", time.c_str(), id_.c_str(), line.c_str());
-  }
-
   const std::string id_;
+  const Logger log_;
   const std::unique_ptr<GrpcCoordinator> coordinator_;
   const std::unique_ptr<BlobStore> shared_blobs_;
   const RealClock clock_;

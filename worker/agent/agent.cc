@@ -30,8 +30,10 @@ std::string DrawInstance() {
   return absl::StrFormat("%08x%08x", random(), random());
 }
 
-std::string NameOf(const v1::JobKey& key) {
-  return absl::StrFormat("reconstruction=%s job=%d epoch=%d", key.reconstruction_id(), key.sequence(), key.epoch());
+LogFields FieldsOf(const v1::JobKey& key) {
+  return {{"reconstruction", key.reconstruction_id()},
+          {"sequence", static_cast<int64_t>(key.sequence())},
+          {"attempt", static_cast<int64_t>(key.epoch())}};
 }
 
 // Errors that another attempt would meet again; all others are the network's or the store's.
@@ -64,7 +66,7 @@ absl::StatusOr<CameraJobSpec> ToSpec(const v1::CameraJob& job, size_t cameras) {
 }  // namespace
 
 Agent::Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, ParseJobMethod parse, AgentJob job,
-             AgentLog log)
+             Logger log)
     : options_(options),
       instance_(DrawInstance()),
       channel_(channel),
@@ -129,7 +131,7 @@ void Agent::Follow(const v1::SynchronizeResponse& response) {
       const bool drop = held.dropped || wanted.count(it->first) == 0;
       if (drop && held.running && !held.dropped) {
         held.dropped = true;
-        log_(absl::StrCat("dropped ", NameOf(held.told.key())));
+        log_.With(FieldsOf(held.told.key())).Warning("job dropped: somebody else has it");
       }
       if (drop && !held.running) {
         ended.push_back(std::move(held.thread));
@@ -151,12 +153,16 @@ void Agent::Follow(const v1::SynchronizeResponse& response) {
 }
 
 void Agent::Work(const Key& key, const v1::CameraJob& job) {
-  log_(absl::StrCat("begun ", NameOf(job.key()), " camera=", job.camera()));
+  const Logger log = log_.With(FieldsOf(job.key())).With({{"camera", static_cast<int64_t>(job.camera())}});
+  log.Info("job begun");
   const absl::Time begun = absl::Now();
   v1::HeldJob told = Process(job);
   const double seconds = absl::ToDoubleSeconds(absl::Now() - begun);
-  log_(told.has_failed() ? absl::StrCat("failed ", NameOf(job.key()), " reason=\"", told.failed().reason(), "\"")
-                         : absl::StrFormat("finished %s seconds=%.2f", NameOf(job.key()), seconds));
+  if (told.has_failed()) {
+    log.Error("job failed", {{"seconds", seconds}, {"error", told.failed().reason()}});
+  } else {
+    log.Info("job finished", {{"seconds", seconds}});
+  }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (told.has_finished()) troubles_ = 0;
@@ -216,7 +222,7 @@ void Agent::Run() {
     }
     if (last) return;
     if (response.ok() || absl::IsCancelled(response.status())) continue;
-    log_(absl::StrCat("no answer from the coordinator: ", std::string(response.status().message())));
+    log_.Warning("no answer from the coordinator", {{"error", std::string(response.status().message())}});
     std::unique_lock<std::mutex> lock(mutex_);
     if (absl::Now() >= drain_until_) return;
     wake_.wait_for(lock, retry);

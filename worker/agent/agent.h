@@ -16,6 +16,7 @@
 
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
+#include "common/telemetry/log.h"
 #include "worker/agent/job_contexts.h"
 #include "worker/agent/worker_channel.h"
 
@@ -29,9 +30,6 @@ struct AgentOptions {
   absl::Duration drain = absl::Seconds(30);  // after Drain(), jobs may take so long before they are given back
 };
 
-// What a worker says while it works, one line each: job begun, finished, failed, dropped.
-using AgentLog = std::function<void(const std::string& line)>;
-
 // What RunCameraJob is, or something quick in tests.
 using AgentJob = std::function<CameraJobResult(const CameraJobInput&, const CameraJobOptions&, ThreadPool&)>;
 
@@ -39,9 +37,9 @@ using AgentJob = std::function<CameraJobResult(const CameraJobInput&, const Came
 // memory; losing it costs the jobs that run, nothing else.
 class Agent {
  public:
-  // `channel` and `blobs` outlive the agent.
+  // `channel` and `blobs` outlive the agent. `log` is told of jobs begun, finished, failed and dropped.
   Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, ParseJobMethod parse, AgentJob job,
-        AgentLog log);
+        Logger log);
   // Waits for jobs that still run.
   ~Agent();
 
@@ -71,7 +69,7 @@ class Agent {
   WorkerChannel& channel_;
   BlobStore& blobs_;
   const AgentJob job_;
-  const AgentLog log_;
+  const Logger log_;
   JobContexts contexts_;
   ThreadPool pool_;
 
