@@ -16,6 +16,7 @@
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
+#include "common/telemetry/log.h"
 #include "common/telemetry/measured_blob_store.h"
 #include "common/telemetry/metrics.h"
 #include "common/telemetry/metrics_server.h"
@@ -68,7 +69,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
     const std::string where =
         settings_.store.empty() ? absl::StrCat("sqlite:", data, "/state.sqlite") : settings_.store;
     MW_ASSIGN_OR_RETURN(store_, OpenJobStore(where, [this](std::unique_ptr<SqlDatabase> database) {
-                          auto measured = std::make_unique<MeasuredSqlDatabase>(std::move(database), metrics_);
+                          auto measured = std::make_unique<MeasuredSqlDatabase>(std::move(database), metrics_, log_);
                           database_ = measured.get();
                           return measured;
                         }));
@@ -122,6 +123,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
   const LeaseOptions lease_;
   const RealClock clock_;
   Metrics metrics_{"coordinator"};
+  const Logger log_ = Logger::ToStderr();
   ThreadPool pool_;
   WorkerLogic workers_;
   std::unique_ptr<JobStore> store_;

@@ -11,23 +11,53 @@ namespace {
 // What one changed row of a statement means.
 struct CountedStatement {
   const char* statement;
-  const char* metric;
+  const char* metric;  // null: not counted
   const char* help;
   const char* outcome;  // label; null: none
+  const char* event;    // null: not logged
+  bool bad_news;
 };
 constexpr char kEnded[] = "meshwright_leases_ended_total";
 constexpr char kEndedHelp[] = "Leases of camera jobs by how they ended; lost: the worker was silent for too long.";
 constexpr CountedStatement kCountedStatements[] = {
-    {"lease_camera_jobs", "meshwright_leases_granted_total", "Camera jobs handed out to workers.", nullptr},
-    {"renew_lease", "meshwright_leases_renewed_total", "Leases prolonged because their worker was heard of.", nullptr},
-    {"complete_camera_job", kEnded, kEndedHelp, "finished"},
-    {"fail_lease", kEnded, kEndedHelp, "failed"},
-    {"release_lease", kEnded, kEndedHelp, "given_back"},
-    {"expire_lease", kEnded, kEndedHelp, "lost"},
-    {"set_camera_job_aside", "meshwright_cameras_set_aside_total", "Cameras given up after repeated failures.",
-     nullptr},
-    {"add_commit", "meshwright_commits_total", "Cameras committed, in the order of their reconstructions.", nullptr},
+    {"create_reconstruction", nullptr, nullptr, nullptr, "reconstruction created", false},
+    {"set_reconstruction_state", nullptr, nullptr, nullptr, "reconstruction ended", false},
+    {"delete_reconstruction", nullptr, nullptr, nullptr, "reconstruction deleted", false},
+    {"lease_camera_jobs", "meshwright_leases_granted_total", "Camera jobs handed out to workers.", nullptr,
+     "jobs leased", false},
+    {"renew_lease", "meshwright_leases_renewed_total", "Leases prolonged because their worker was heard of.", nullptr,
+     nullptr, false},
+    {"complete_camera_job", kEnded, kEndedHelp, "finished", "job finished", false},
+    {"fail_lease", kEnded, kEndedHelp, "failed", "job failed", true},
+    {"release_lease", kEnded, kEndedHelp, "given_back", "job given back", false},
+    {"expire_lease", kEnded, kEndedHelp, "lost", "lease lost", true},
+    {"reassign_camera_job", nullptr, nullptr, nullptr, "job handed out again", true},
+    {"set_camera_job_aside", "meshwright_cameras_set_aside_total", "Cameras given up after repeated failures.", nullptr,
+     "camera set aside", true},
+    {"add_commit", "meshwright_commits_total", "Cameras committed, in the order of their reconstructions.", nullptr,
+     "camera committed", false},
+    {"acquire_conductor_lease", nullptr, nullptr, nullptr, "conducting", false},
 };
+
+// Parameters that a line of the log shows, by the names of its fields.
+constexpr std::pair<const char*, const char*> kLoggedParameters[] = {
+    {"id", "reconstruction"}, {"sequence", "sequence"}, {"epoch", "attempt"}, {"camera", "camera"},
+    {"worker", "worker"},     {"owner", "coordinator"}, {"state", "state"},   {"accepted_patches", "accepted_patches"},
+    {"reason", "error"},
+};
+
+LogFields FieldsOf(const SqlParameters& parameters) {
+  LogFields fields;
+  for (const auto& [name, field] : kLoggedParameters) {
+    for (const auto& [parameter, value] : parameters) {
+      if (parameter != name) continue;
+      if (const auto* const number = std::get_if<int64_t>(&value)) fields.emplace_back(field, *number);
+      const auto* const text = std::get_if<std::string>(&value);
+      if (text != nullptr && !text->empty()) fields.emplace_back(field, *text);
+    }
+  }
+  return fields;
+}
 
 constexpr char kAccepted[] = "meshwright_rays_accepted_total";
 constexpr char kAcceptedHelp[] = "Rays whose patch other cameras confirmed: what became part of a mesh.";
@@ -38,12 +68,13 @@ prometheus::Labels LabelsOf(const CountedStatement& counted) {
 
 }  // namespace
 
-MeasuredSqlDatabase::MeasuredSqlDatabase(std::unique_ptr<SqlDatabase> database, Metrics& metrics)
+MeasuredSqlDatabase::MeasuredSqlDatabase(std::unique_ptr<SqlDatabase> database, Metrics& metrics, Logger log)
     : database_(std::move(database)),
       metrics_(metrics),
-      calls_(metrics, "meshwright_store", "Statements in the store") {
+      calls_(metrics, "meshwright_store", "Statements in the store"),
+      log_(std::move(log)) {
   for (const CountedStatement& counted : kCountedStatements) {
-    metrics_.Counter(counted.metric, counted.help, LabelsOf(counted));
+    if (counted.metric != nullptr) metrics_.Counter(counted.metric, counted.help, LabelsOf(counted));
   }
   metrics_.Counter(kAccepted, kAcceptedHelp);
 }
@@ -51,7 +82,7 @@ MeasuredSqlDatabase::MeasuredSqlDatabase(std::unique_ptr<SqlDatabase> database, 
 absl::StatusOr<SqlResult> MeasuredSqlDatabase::Run(const std::string& statement, const SqlParameters& parameters) {
   const absl::Time begun = absl::Now();
   absl::StatusOr<SqlResult> result = database_->Run(statement, parameters);
-  calls_.Record(statement, absl::Now() - begun, result.status());
+  Record(statement, begun, result.status());
   if (result.ok()) {
     CountChanges(statement, parameters, static_cast<int64_t>(result->rows.size()), result->changed);
   }
@@ -61,22 +92,38 @@ absl::StatusOr<SqlResult> MeasuredSqlDatabase::Run(const std::string& statement,
 absl::StatusOr<bool> MeasuredSqlDatabase::RunTogether(const std::vector<SqlCall>& calls) {
   const absl::Time begun = absl::Now();
   absl::StatusOr<bool> changed = database_->RunTogether(calls);
-  calls_.Record("transaction", absl::Now() - begun, changed.status());
+  Record("transaction", begun, changed.status());
   if (changed.ok() && *changed) {
     for (const SqlCall& call : calls) CountChanges(call.statement, call.parameters, 0, 1);
   }
   return changed;
 }
 
+void MeasuredSqlDatabase::Record(const std::string& operation, absl::Time begun, const absl::Status& status) {
+  calls_.Record(operation, absl::Now() - begun, status);
+  if (!status.ok()) {
+    log_.Error("store failed", {{"operation", operation}, {"error", std::string(status.message())}});
+  }
+}
+
 void MeasuredSqlDatabase::CountChanges(const std::string& statement, const SqlParameters& parameters, int64_t rows,
                                        int64_t changed) {
+  // Statements that give back what they changed tell it by their rows.
+  const int64_t count = std::max(rows, changed);
+  if (count == 0) return;
   for (const CountedStatement& counted : kCountedStatements) {
-    // Statements that give back what they changed tell it by their rows.
-    const int64_t count = std::max(rows, changed);
-    if (statement != counted.statement || count == 0) continue;
-    metrics_.Counter(counted.metric, counted.help, LabelsOf(counted)).Increment(static_cast<double>(count));
+    if (statement != counted.statement) continue;
+    if (counted.metric != nullptr) {
+      metrics_.Counter(counted.metric, counted.help, LabelsOf(counted)).Increment(static_cast<double>(count));
+    }
+    if (counted.event == nullptr) continue;
+    if (counted.bad_news) {
+      log_.Warning(counted.event, FieldsOf(parameters));
+    } else {
+      log_.Info(counted.event, FieldsOf(parameters));
+    }
   }
-  if (statement != "add_commit" || changed == 0) return;
+  if (statement != "add_commit") return;
   for (const auto& [name, value] : parameters) {
     if (name != "accepted_patches") continue;
     metrics_.Counter(kAccepted, kAcceptedHelp).Increment(static_cast<double>(std::get<int64_t>(value)));

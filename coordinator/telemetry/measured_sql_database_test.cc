@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,7 +26,9 @@ class MeasuredStoreTest : public testing::Test {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
     auto store = OpenSqliteJobStore(folder_ + "/state.sqlite", &clock_, [this](std::unique_ptr<SqlDatabase> database) {
-      auto measured = std::make_unique<MeasuredSqlDatabase>(std::move(database), metrics_);
+      auto measured = std::make_unique<MeasuredSqlDatabase>(
+          std::move(database), metrics_,
+          Logger(Logger::Format::kText, clock_, [this](const std::string& line) { lines_.push_back(line); }));
       database_ = measured.get();
       return measured;
     });
@@ -51,6 +54,7 @@ class MeasuredStoreTest : public testing::Test {
   ManualClock clock_;
   WorkerLogic workers_{LeaseOptions(), clock_};
   Metrics metrics_{"coordinator"};
+  std::vector<std::string> lines_;
   SqlDatabase* database_ = nullptr;
   std::unique_ptr<JobStore> store_;
 };
@@ -104,6 +108,19 @@ TEST_F(MeasuredStoreTest, CommitsBringAcceptedRaysAlsoInTransactions) {
   ExpectLine("meshwright_jobs_waiting 1");
 }
 
+TEST_F(MeasuredStoreTest, WhatHappensIsLoggedOnceAndWithNames) {
+  Assign(1);
+  const CameraLease lease = Lease();
+  for (int repetition = 0; repetition < 2; ++repetition) {
+    ASSERT_TRUE(store_->FailLease("r", 1, lease.job.epoch, "w", {.reason = "no light"}, clock_.Now()).ok());
+  }
+  EXPECT_THAT(lines_, testing::ElementsAre(
+                          testing::EndsWith("info    reconstruction created  reconstruction=r  state=running"),
+                          testing::EndsWith("info    jobs leased  worker=w"),
+                          testing::EndsWith("warning job failed  reconstruction=r  sequence=1  attempt=2  worker=w  "
+                                            "error=\"no light\"")));
+}
+
 TEST_F(MeasuredStoreTest, GaugesFollowTheStore) {
   ExpectLine("meshwright_jobs_waiting 0");
   ExpectLine("meshwright_reconstructions{state=\"running\"} 1");
@@ -148,7 +165,10 @@ class BrokenDatabase final : public SqlDatabase {
 
 TEST(MeasuredSqlDatabaseTest, ErrorsAreCountedAndChangeNothingElse) {
   Metrics metrics("coordinator");
-  MeasuredSqlDatabase database(std::make_unique<BrokenDatabase>(), metrics);
+  std::vector<std::string> lines;
+  const ManualClock clock;
+  const Logger log(Logger::Format::kText, clock, [&](const std::string& line) { lines.push_back(line); });
+  MeasuredSqlDatabase database(std::make_unique<BrokenDatabase>(), metrics, log);
   EXPECT_FALSE(database.Run("add_commit", {{"accepted_patches", int64_t{5}}}).ok());
   EXPECT_FALSE(database.RunTogether({{"add_commit", {{"accepted_patches", int64_t{5}}}}}).ok());
   const std::string text = metrics.Text();
@@ -156,6 +176,8 @@ TEST(MeasuredSqlDatabaseTest, ErrorsAreCountedAndChangeNothingElse) {
   EXPECT_THAT(text, HasSubstr("meshwright_store_errors_total{code=\"unavailable\",operation=\"transaction\"} 1\n"));
   EXPECT_THAT(text, HasSubstr("meshwright_commits_total 0\n"));
   EXPECT_THAT(text, HasSubstr("meshwright_rays_accepted_total 0\n"));
+  EXPECT_THAT(lines, testing::ElementsAre(HasSubstr("error   store failed  operation=add_commit  error=gone"),
+                                          HasSubstr("error   store failed  operation=transaction  error=gone")));
 }
 
 }  // namespace
