@@ -8,6 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "coordinator/store/postgres_job_store.h"
+#include "coordinator/store/postgres_testing.h"
 #include "coordinator/store/sqlite_job_store.h"
 #include "coordinator/telemetry/cluster_gauges.h"
 
@@ -151,6 +153,43 @@ TEST_F(MeasuredStoreTest, WorkersAndTheDiskAreSeen) {
   ExpectLine("meshwright_workers_cores 3");
   ExpectLine("meshwright_workers_draining 0");
   EXPECT_THAT(metrics_.Text(), testing::ContainsRegex("\nmeshwright_data_disk_free_bytes [1-9]"));
+}
+
+// The statements of the gauges are said in PostgreSQL's way too.
+TEST(MeasuredPostgresTest, CountsAndGaugesAreThose) {
+  const auto server = SharedTestPostgres();
+  if (!server.ok()) GTEST_SKIP() << server.status();
+  const PostgresSchema schema(*server);
+  const RealClock clock;
+  Metrics metrics("coordinator");
+  const WorkerLogic workers(LeaseOptions(), clock);
+  SqlDatabase* database = nullptr;
+  const auto store = OpenPostgresJobStore(schema.url(), {}, [&](std::unique_ptr<SqlDatabase> unmeasured) {
+    auto measured = std::make_unique<MeasuredSqlDatabase>(std::move(unmeasured), metrics, Logger::Nowhere());
+    database = measured.get();
+    return measured;
+  });
+  ASSERT_TRUE(store.ok()) << store.status();
+  AddClusterGauges(metrics, *database, workers, "/");
+  const absl::Time now = clock.Now();
+  ASSERT_TRUE((*store)
+                  ->CreateReconstruction({.id = "r", .options_json = "{}", .scene_digest = std::string(64, 'a')},
+                                         now - absl::Hours(2))
+                  .ok());
+  EXPECT_THAT(metrics.Text(), testing::ContainsRegex("\nmeshwright_longest_without_commit_seconds 72[0-9][0-9]"));
+  for (const SequenceNumber sequence : {1, 2}) {
+    ASSERT_TRUE((*store)->AssignCameraJob("r", sequence, sequence, 0, now).ok());
+  }
+  ASSERT_TRUE((*store)->CompleteCameraJob("r", 1, 1, std::string(64, 'b'), {}, "{}", now).ok());
+  ASSERT_TRUE((*store)->AddCommit("r", {.sequence = 1, .camera = 1}, now).ok());
+  const std::string text = metrics.Text();
+  for (const char* const line :
+       {"meshwright_jobs_waiting 1", "meshwright_commits_total 1", "meshwright_reconstructions{state=\"running\"} 1",
+        "meshwright_leases_ended_total{outcome=\"finished\"} 1"}) {
+    EXPECT_THAT(text, HasSubstr(std::string("\n") + line + "\n"));
+  }
+  EXPECT_THAT(text, testing::ContainsRegex("\nmeshwright_longest_without_commit_seconds [0-9]\\."));
+  EXPECT_THAT(text, Not(HasSubstr("meshwright_store_errors_total{")));
 }
 
 // Answers everything with an error.
