@@ -1,12 +1,12 @@
 #include "common/telemetry/measured_blob_store.h"
 
+#include <filesystem>
 #include <memory>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/base/files.h"
 #include "common/blob/filesystem_blob_store.h"
 
 namespace meshwright {
@@ -17,6 +17,7 @@ using testing::Not;
 
 TEST(MeasuredBlobStoreTest, PassesThroughAndCounts) {
   const std::string folder = testing::TempDir() + "measured_blobs";
+  std::filesystem::remove_all(folder);
   const auto blobs = FilesystemBlobStore::Open(folder);
   ASSERT_TRUE(blobs.ok()) << blobs.status();
   Metrics metrics("worker");
@@ -37,6 +38,7 @@ TEST(MeasuredBlobStoreTest, PassesThroughAndCounts) {
   EXPECT_THAT(text, HasSubstr("meshwright_blob_seconds_count{operation=\"get\"} 3\n"));
   EXPECT_THAT(text, HasSubstr("meshwright_blob_seconds_count{operation=\"put\"} 1\n"));
   EXPECT_THAT(text, HasSubstr("meshwright_blob_errors_total{code=\"not_found\",operation=\"get\"} 1\n"));
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

@@ -42,6 +42,10 @@ class MeasuredStoreTest : public testing::Test {
                                            clock_.Now())
                     .ok());
   }
+  void TearDown() override {
+    store_.reset();
+    std::filesystem::remove_all(folder_);
+  }
   void Assign(SequenceNumber sequence) {
     ASSERT_TRUE(store_->AssignCameraJob("r", sequence, sequence, sequence - 1, clock_.Now()).ok());
   }
