@@ -112,7 +112,7 @@ export function App() {
         Skip to the content
       </a>
       <header class="top">
-        <a class="brand" href={linkTo.reconstructions}>
+        <a class="brand" href={linkTo.reconstructions} aria-label="Meshwright, all reconstructions">
           <Logo />
           <span>Meshwright</span>
         </a>

@@ -8,7 +8,7 @@ import type { ReconstructionStore } from '../state/reconstruction_store';
 import { cssColor, theme } from '../theme';
 import { prepareCanvas } from './canvas';
 
-const LARGEST_PX = 620;
+const LARGEST_PX = 480;
 const FADED = 0.28;
 
 // Pairs per cell of a picture of cells x cells, those of processed rows counting less, in units of the fullest cell.

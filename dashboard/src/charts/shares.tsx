@@ -54,7 +54,7 @@ function makePlot(parent: HTMLElement, width: number, onClick: (index: number) =
       height: 220,
       scales: { x: { time: false }, y: { range: [0, 100] } },
       axes: [
-        { ...axis, size: 30 },
+        { ...axis, size: 30, incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000] },
         { ...axis, size: 46, values: (_, values) => values.map((value) => `${value} %`) },
       ],
       series: [{ label: 'Camera' }, series('Grown', '--series-1'), series('Meshed', '--series-2')],

@@ -6,7 +6,8 @@ import { CAMERA_STATES, isOver, stateOf } from '../api/types';
 import { count } from '../format';
 import type { ReconstructionStore } from '../state/reconstruction_store';
 import { cssColor, theme } from '../theme';
-import type { Coloring } from '../view3d/part_batch';
+import type { Coloring } from '../view3d/part_buffer';
+import { nextBudget } from '../view3d/level_of_detail';
 import { PartLoader } from '../view3d/part_loader';
 import type { SceneViewer } from '../view3d/scene_viewer';
 import { Notice, Segmented } from './pieces';
@@ -20,7 +21,9 @@ const COLORINGS = [
 const STATE_WORDS = ['waiting', 'under way', 'processed', 'committed', 'set aside'] as const;
 
 // A phone has less memory, and fewer pixels to see them with.
-const FACE_BUDGET = window.matchMedia('(max-width: 700px), (pointer: coarse)').matches ? 400_000 : 1_500_000;
+const LARGEST_BUDGET = window.matchMedia('(max-width: 700px), (pointer: coarse)').matches ? 400_000 : 1_500_000;
+const SOFTWARE_BUDGET = 60_000;
+const FRAMES_TO_JUDGE = 5;
 
 interface Props {
   store: ReconstructionStore;
@@ -35,9 +38,10 @@ export function ViewerPanel({ store, selected, onSelect }: Props) {
   const [loader, setLoader] = useState<PartLoader | null>(null);
   const [failure, setFailure] = useState('');
   const rest = useRef(() => {});
+  const frameTook = useRef((_milliseconds: number) => {});
   const [coloring, setColoring] = useState<Coloring>('photo');
   const [frusta, setFrusta] = useState(true);
-  const [numbers, setNumbers] = useState({ parts: 0, faces: 0, shown: 0 });
+  const [numbers, setNumbers] = useState({ parts: 0, faces: 0, shown: 0, complete: false });
 
   useEffect(() => {
     let closed = false;
@@ -46,7 +50,13 @@ export function ViewerPanel({ store, selected, onSelect }: Props) {
     void import('../view3d/scene_viewer').then(({ SceneViewer }) => {
       if (closed) return;
       try {
-        close = open(new SceneViewer(canvas.current!, { onPick: onSelect, onRest: () => rest.current() }));
+        close = open(
+          new SceneViewer(canvas.current!, {
+            onPick: onSelect,
+            onRest: () => rest.current(),
+            onFrame: (milliseconds) => frameTook.current(milliseconds),
+          }),
+        );
       } catch {
         setFailure('This browser does not offer WebGL 2; everything but the 3D view works.');
       }
@@ -58,19 +68,35 @@ export function ViewerPanel({ store, selected, onSelect }: Props) {
   }, [store]);
 
   const open = (made: SceneViewer) => {
-    const loading = new PartLoader({
-      data: store.data,
-      urlOf: (sequence, maxFaces) => reconstructionUrl(store.id, `/parts/${sequence}/preview?max_faces=${maxFaces}`),
-      budget: FACE_BUDGET,
-      show: (part, geometry) => made.show(part, geometry),
-      importanceOf: (part) => made.importanceOf(part),
-    });
+    let budget = made.inSoftware ? SOFTWARE_BUDGET : LARGEST_BUDGET;
+    const loading = new PartLoader(
+      {
+        data: store.data,
+        urlOf: (sequence, maxFaces) => reconstructionUrl(store.id, `/parts/${sequence}/preview?max_faces=${maxFaces}`),
+        show: (part, geometry) => made.show(part, geometry),
+        importanceOf: (part) => made.importanceOf(part),
+      },
+      budget,
+    );
     rest.current = () => loading.plan();
+    let times: number[] = [];
+    frameTook.current = (milliseconds) => {
+      times.push(milliseconds);
+      if (times.length < FRAMES_TO_JUDGE) return;
+      const median = times.sort((a, b) => a - b)[FRAMES_TO_JUDGE >> 1]!;
+      times = [];
+      budget = nextBudget(budget, LARGEST_BUDGET, median, made.shownFaces);
+      loading.setBudget(budget);
+    };
     setViewer(made);
     setLoader(loading);
     const counting = setInterval(() => {
-      const now = { parts: loading.parts.size, faces: loading.facesOfWhole, shown: made.shownFaces };
-      setNumbers((old) => (old.parts === now.parts && old.faces === now.faces && old.shown === now.shown ? old : now));
+      setNumbers({
+        parts: loading.parts.size,
+        faces: loading.facesOfWhole,
+        shown: made.shownFaces,
+        complete: loading.complete,
+      });
     }, 250);
     return () => {
       clearInterval(counting);
@@ -176,6 +202,7 @@ export function ViewerPanel({ store, selected, onSelect }: Props) {
           data-parts={numbers.parts}
           data-faces={numbers.faces}
           data-shown={numbers.shown}
+          data-complete={numbers.complete}
           aria-live="off"
         >
           {words}

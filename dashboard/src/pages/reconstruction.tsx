@@ -42,7 +42,9 @@ function Summary({ store, reconstruction }: { store: ReconstructionStore; recons
       <ProgressBar progress={progress} label="Cameras committed" />
       <dl class="facts">
         <Fact name="Cameras" value={`${count(progress.camerasCommitted ?? 0)} of ${count(total)}`} />
-        <Fact name="In flight" value={count(progress.camerasInFlight ?? 0)} title="Chosen and not yet committed" />
+        {!isOver(state) && (
+          <Fact name="In flight" value={count(progress.camerasInFlight ?? 0)} title="Chosen and not yet committed" />
+        )}
         {(progress.camerasSetAside ?? 0) > 0 && (
           <Fact name="Set aside" value={count(progress.camerasSetAside!)} title="Given up after repeated failures" />
         )}

@@ -1,5 +1,12 @@
 import { describe, expect, it } from 'vitest';
-import { chooseFaceCaps, COARSEST_CAP, worthReplacing, type PartDemand } from './level_of_detail';
+import {
+  chooseFaceCaps,
+  COARSEST_CAP,
+  nextBudget,
+  SMALLEST_BUDGET,
+  worthReplacing,
+  type PartDemand,
+} from './level_of_detail';
 
 // Deterministic numbers in [0, 1): the laws must hold for any parts.
 function numbers(seed: number) {
@@ -70,5 +77,38 @@ describe('worthReplacing', () => {
   it('coarsens only to stay in the budget', () => {
     expect(worthReplacing(512, 256, 10_000, false)).toBe(false);
     expect(worthReplacing(512, 256, 10_000, true)).toBe(true);
+  });
+});
+
+describe('nextBudget', () => {
+  const LARGEST = 1_500_000;
+  // A graphics card that takes so long for a frame, and so long for each face.
+  const settle = (start: number, frameMs: (faces: number) => number) => {
+    const budgets = [start];
+    for (let frame = 0; frame < 100; ++frame) {
+      const budget = budgets.at(-1)!;
+      budgets.push(nextBudget(budget, LARGEST, frameMs(budget), budget));
+    }
+    return budgets;
+  };
+
+  it('gives a fast card everything', () => {
+    expect(settle(100_000, (faces) => faces / 1e6).at(-1)).toBe(LARGEST);
+  });
+  it('settles where frames are neither slow nor needlessly coarse', () => {
+    for (const facesPerMs of [700, 1500, 4000, 12_000]) {
+      const budgets = settle(LARGEST, (faces) => faces / facesPerMs);
+      const last = budgets.at(-1)!;
+      expect(last / facesPerMs).toBeLessThanOrEqual(90);
+      expect(last / facesPerMs).toBeGreaterThanOrEqual(Math.min(25, LARGEST / facesPerMs));
+      expect(new Set(budgets.slice(-20)).size).toBe(1); // no swinging
+    }
+  });
+  it('never leaves its bounds', () => {
+    expect(settle(LARGEST, () => 10_000).at(-1)).toBe(SMALLEST_BUDGET);
+    expect(settle(SMALLEST_BUDGET, () => 0).at(-1)).toBe(LARGEST);
+  });
+  it('does not grow while little is shown, which says nothing', () => {
+    expect(nextBudget(100_000, LARGEST, 1, 10_000)).toBe(100_000);
   });
 });

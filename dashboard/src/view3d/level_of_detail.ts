@@ -7,8 +7,8 @@ export interface PartDemand {
 }
 
 export const FINEST_CAP = 2 ** 20;
-// Fewer do not look like the surface any more.
-export const COARSEST_CAP = 64;
+// A few triangles where the surface is: better than a hole.
+export const COARSEST_CAP = 8;
 
 // The most faces to ask for, per part: a power of two, so that small changes do not make everything be fetched again;
 // 0 where not even the coarsest fits, the least important first. The sum of min(faces, cap) never exceeds `budget`.
@@ -53,4 +53,20 @@ export function chooseFaceCaps(parts: readonly PartDemand[], budget: number): Ui
 export function worthReplacing(shownCap: number, wantedCap: number, faces: number, overBudget: boolean): boolean {
   if (Math.min(shownCap, faces) === Math.min(wantedCap, faces)) return false;
   return wantedCap > shownCap || overBudget;
+}
+
+export const SMALLEST_BUDGET = 30_000;
+const SLOW_MS = 90;
+const FAST_MS = 30;
+const STEP = 1.6;
+
+// The budget after a frame of so many faces took the graphics card so long. A machine without one, or a weak one, gets
+// fewer triangles instead of a page that stops.
+export function nextBudget(budget: number, largest: number, frameMs: number, shownFaces: number): number {
+  if (frameMs > SLOW_MS) {
+    const shrunk = Math.min(budget, shownFaces) * Math.max(SLOW_MS / 1.5 / frameMs, 1 / STEP ** 2);
+    return Math.min(budget, Math.max(SMALLEST_BUDGET, Math.round(shrunk)));
+  }
+  if (frameMs < FAST_MS && shownFaces > budget / 3) return Math.min(largest, Math.round(budget * STEP));
+  return budget;
 }

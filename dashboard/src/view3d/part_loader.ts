@@ -17,7 +17,6 @@ export interface LoadedPart {
 export interface PartLoaderOptions {
   data: DataService;
   urlOf: (sequence: number, maxFaces: number) => string;
-  budget: number;
   show: (part: LoadedPart, geometry: PartGeometry | null) => void;
   // How much of the screen it covers, in any unit, > 0. Asked only for parts with a centre.
   importanceOf: (part: LoadedPart) => number;
@@ -34,9 +33,18 @@ export class PartLoader {
   private wanted: { part: LoadedPart; cap: number }[] = [];
   private underWay = new Set<number>();
   private retryTimer: ReturnType<typeof setTimeout> | undefined;
-  shownFaces = 0;
 
-  constructor(private readonly options: PartLoaderOptions) {}
+  // `budget`: faces to show, at most.
+  constructor(
+    private readonly options: PartLoaderOptions,
+    private budget: number,
+  ) {}
+
+  setBudget(budget: number) {
+    if (budget === this.budget) return;
+    this.budget = budget;
+    this.plan();
+  }
 
   add(parts: readonly { sequence: number; camera: number; patches: string }[]) {
     for (const { sequence, camera, patches } of parts) {
@@ -69,11 +77,11 @@ export class PartLoader {
       // Unseen parts count as any other; nothing is left out altogether for being far away.
       importance: Math.max(Number.isNaN(importance[i]) ? median : importance[i]!, median / 64, 1e-9),
     }));
-    const caps = chooseFaceCaps(demands, this.options.budget);
+    const caps = chooseFaceCaps(demands, this.budget);
     // What is finer than wanted stays as long as there is room for everything that is wanted.
     let afterwards = 0;
     parts.forEach((part, i) => (afterwards += Math.max(part.shownFaces, Math.min(part.faces, caps[i]!))));
-    const overBudget = afterwards > this.options.budget;
+    const overBudget = afterwards > this.budget;
 
     this.wanted = [];
     parts.forEach((part, i) => {
@@ -102,7 +110,6 @@ export class PartLoader {
   }
 
   private drop(part: LoadedPart) {
-    this.shownFaces -= part.shownFaces;
     part.shownCap = 0;
     part.shownFaces = 0;
     this.options.show(part, null);
@@ -123,7 +130,6 @@ export class PartLoader {
       const geometry = await this.options.data.ask({ kind: 'preview', url }, this.abort.signal);
       if (this.abort.signal.aborted) return;
       const faces = geometry.indices.length / 3;
-      this.shownFaces += faces - part.shownFaces;
       part.shownCap = cap;
       part.shownFaces = faces;
       part.faces = geometry.facesOfWhole;

@@ -16,7 +16,7 @@ import {
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { POSE, type CameraTable } from '../api/camera_table';
 import { CameraFrusta } from './camera_frusta';
-import { PartBatch, type Coloring } from './part_batch';
+import { PartBuffer, type Coloring } from './part_buffer';
 import type { LoadedPart } from './part_loader';
 import type { PartGeometry } from './preview_decoder';
 
@@ -24,6 +24,8 @@ export interface SceneViewerCallbacks {
   onPick: (camera: number) => void;
   // The view has come to rest.
   onRest: () => void;
+  // So long the graphics card took for the last frame.
+  onFrame: (milliseconds: number) => void;
 }
 
 // Photographs' colours go to the screen as they are.
@@ -32,15 +34,18 @@ ColorManagement.enabled = false;
 const REST_MS = 250;
 // Frames that only show that more has come need not be many; software rendering leaves little time for anything else.
 const MS_BETWEEN_GROWTH_FRAMES = 150;
+const LONGEST_FRAME_MS = 5000;
 // So much of a frame may go into taking up new parts.
 const MS_PER_FRAME = 8;
 
 export class SceneViewer {
+  // There is no graphics card, or the browser does not use it.
+  readonly inSoftware: boolean;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly view = new PerspectiveCamera(45, 1, 0.01, 1000);
   private controls: OrbitControls;
-  private readonly batch = new PartBatch();
+  private readonly parts = new PartBuffer();
   private readonly frusta = new CameraFrusta();
   private readonly light = new DirectionalLight(0xffffff, 1.9);
   private readonly resizing: ResizeObserver;
@@ -50,6 +55,10 @@ export class SceneViewer {
   private queue: { part: LoadedPart; geometry: PartGeometry | null }[] = [];
   private table: CameraTable | null = null;
   private frameRequested = 0;
+  private frameUnderWay = false;
+  private frameMs = 0;
+  private wanted = false;
+  private fenceTimer: ReturnType<typeof setTimeout> | undefined;
   private restTimer: ReturnType<typeof setTimeout> | undefined;
   private growthTimer: ReturnType<typeof setTimeout> | undefined;
   private movedByHand = false;
@@ -61,9 +70,14 @@ export class SceneViewer {
     private readonly canvas: HTMLCanvasElement,
     private readonly callbacks: SceneViewerCallbacks,
   ) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
+    this.inSoftware = drawsInSoftware();
+    this.renderer = new WebGLRenderer({
+      canvas,
+      antialias: !this.inSoftware,
+      powerPreference: 'high-performance',
+    });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
-    this.scene.add(this.batch.mesh, this.frusta.lines, new AmbientLight(0xffffff, 1.1), this.light);
+    this.scene.add(this.parts.mesh, this.frusta.lines, new AmbientLight(0xffffff, 1.1), this.light);
     this.view.up.copy(this.up);
     this.controls = this.makeControls();
     canvas.addEventListener('pointerdown', this.press);
@@ -79,7 +93,7 @@ export class SceneViewer {
   }
 
   setColoring(coloring: Coloring) {
-    this.batch.setColoring(coloring);
+    this.parts.setColoring(coloring);
     this.draw();
   }
 
@@ -101,14 +115,17 @@ export class SceneViewer {
   // Another level of detail of a part, or nothing of it any more.
   show(part: LoadedPart, geometry: PartGeometry | null) {
     this.queue.push({ part, geometry });
-    this.growthTimer ??= setTimeout(() => {
-      this.growthTimer = undefined;
-      this.draw();
-    }, MS_BETWEEN_GROWTH_FRAMES);
+    this.growthTimer ??= setTimeout(
+      () => {
+        this.growthTimer = undefined;
+        this.draw();
+      },
+      Math.max(MS_BETWEEN_GROWTH_FRAMES, 3 * this.frameMs),
+    );
   }
 
   get shownFaces(): number {
-    return this.batch.faces;
+    return this.parts.faces;
   }
 
   select(camera: number) {
@@ -180,11 +197,12 @@ export class SceneViewer {
     cancelAnimationFrame(this.frameRequested);
     clearTimeout(this.restTimer);
     clearTimeout(this.growthTimer);
+    clearTimeout(this.fenceTimer);
     this.resizing.disconnect();
     this.canvas.removeEventListener('pointerdown', this.press);
     this.canvas.removeEventListener('pointerup', this.release);
     this.controls.dispose();
-    this.batch.dispose();
+    this.parts.dispose();
     this.frusta.dispose();
     this.renderer.dispose();
   }
@@ -215,17 +233,42 @@ export class SceneViewer {
   }
 
   private draw() {
-    if (this.frameRequested !== 0) return;
+    this.wanted = true;
+    // One frame at a time: whoever sends more than the graphics card takes is made to wait by the browser.
+    if (this.frameRequested !== 0 || this.frameUnderWay) return;
     this.frameRequested = requestAnimationFrame(() => {
       this.frameRequested = 0;
+      this.wanted = false;
       this.takeUpParts();
       this.light.position.copy(this.view.position).addScaledVector(this.up, this.radius() * 0.3);
       this.light.target.position.copy(this.controls.target);
       this.light.target.updateMatrixWorld();
       this.placeClippingPlanes();
       this.renderer.render(this.scene, this.view);
-      if (this.queue.length > 0) this.draw();
+      this.waitForFrame();
+      if (this.queue.length > 0) this.wanted = true;
     });
+  }
+
+  private waitForFrame() {
+    const context = this.renderer.getContext() as WebGL2RenderingContext;
+    const fence = context.fenceSync(context.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    context.flush();
+    const began = performance.now();
+    this.frameUnderWay = true;
+    const look = () => {
+      const done = fence === null || context.getSyncParameter(fence, context.SYNC_STATUS) === context.SIGNALED;
+      if (!done && !context.isContextLost() && performance.now() - began < LONGEST_FRAME_MS) {
+        this.fenceTimer = setTimeout(look, 4);
+        return;
+      }
+      context.deleteSync(fence);
+      this.frameUnderWay = false;
+      this.frameMs = performance.now() - began;
+      this.callbacks.onFrame(this.frameMs);
+      if (this.wanted) this.draw();
+    };
+    this.fenceTimer = setTimeout(look, 0);
   }
 
   private takeUpParts() {
@@ -234,10 +277,10 @@ export class SceneViewer {
     while (taken < this.queue.length && (taken === 0 || performance.now() < until)) {
       const { part, geometry } = this.queue[taken++]!;
       if (geometry === null) {
-        this.batch.remove(part.sequence);
+        this.parts.remove(part.sequence);
         continue;
       }
-      this.batch.put(part.sequence, part.camera, geometry);
+      this.parts.put(part.sequence, part.camera, geometry);
       if (geometry.indices.length === 0) continue;
       this.partBox.expandByPoint(new Vector3(...geometry.min)).expandByPoint(new Vector3(...geometry.max));
     }
@@ -266,7 +309,7 @@ export class SceneViewer {
     const size = this.cameraBox.getSize(new Vector3());
     const sides = [size.x, size.y, size.z].sort((a, b) => b - a);
     const area = Math.max(sides[0]! * Math.max(sides[1]!, sides[0]! * 0.1), 1e-12);
-    return 0.45 * Math.sqrt(area / Math.max(table.count, 1));
+    return 0.35 * Math.sqrt(area / Math.max(table.count, 1));
   }
 
   private boxOfAll(): Box3 {
@@ -300,6 +343,14 @@ export class SceneViewer {
     this.view.updateProjectionMatrix();
     this.draw();
   }
+}
+
+function drawsInSoftware(): boolean {
+  const context = document.createElement('canvas').getContext('webgl2');
+  const info = context?.getExtension('WEBGL_debug_renderer_info');
+  const name = info ? String(context!.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+  context?.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
 }
 
 function quaternionBetween(from: Vector3, to: Vector3): Quaternion {
