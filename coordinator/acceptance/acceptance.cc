@@ -23,7 +23,7 @@ constexpr double kClearanceInRadii = 2;
 // Looks for patches of one supporter near points.
 class SupportIndex {
  public:
-  explicit SupportIndex(const PatchLattice& surface) : surface_(surface) {
+  explicit SupportIndex(const SparseSurface& surface) : surface_(surface), finder_(surface) {
     const Lattice& lattice = surface.lattice;
     const Camera& camera = surface.camera;
     for (int column = 0; column < lattice.columns; ++column) {
@@ -41,7 +41,9 @@ class SupportIndex {
     if (!(at.x() >= 0 && at.y() >= 0 && at.x() < lattice.columns - 1 && at.y() < lattice.rows - 1)) return false;
     const int64_t node = lattice.Index(static_cast<int>(at.x()), static_cast<int>(at.y()));
     for (const int64_t corner : {node, node + 1, node + lattice.columns, node + lattice.columns + 1}) {
-      if (surface_.depth[static_cast<size_t>(corner)] < x_in_cam.z() + clearance) return false;
+      const int32_t patch = finder_.At(corner);
+      if (patch == PatchFinder::kNone) return false;
+      if (surface_.depth[static_cast<size_t>(patch)] < x_in_cam.z() + clearance) return false;
     }
     return true;
   }
@@ -66,15 +68,16 @@ class SupportIndex {
 
     const double squared_radius = radius * radius;
     // Where surfaces agree, the node in the middle of the window says so at once.
-    const int middle_row = (first_row + last_row) / 2;
-    if (IsNear((first_column + last_column) / 2, middle_row, x_in_cam, squared_radius)) return true;
+    const int32_t middle = finder_.At(lattice.Index((first_column + last_column) / 2, (first_row + last_row) / 2));
+    if (middle != PatchFinder::kNone && IsNear(middle, x_in_cam, squared_radius)) return true;
     const auto low_depth = static_cast<float>(x_in_cam.z() - radius) * (1 - kDepthSlack);
     const auto high_depth = static_cast<float>(x_in_cam.z() + radius) * (1 + kDepthSlack);
     for (int row = first_row; row <= last_row; ++row) {
-      const float* depths = surface_.depth.data() + lattice.Index(0, row);
-      for (int column = first_column; column <= last_column; ++column) {
-        if (depths[column] < low_depth || depths[column] > high_depth) continue;
-        if (IsNear(column, row, x_in_cam, squared_radius)) return true;
+      const int32_t end = finder_.FirstFrom(lattice.Index(last_column, row) + 1);
+      for (int32_t patch = finder_.FirstFrom(lattice.Index(first_column, row)); patch < end; ++patch) {
+        const float depth = surface_.depth[static_cast<size_t>(patch)];
+        if (depth < low_depth || depth > high_depth) continue;
+        if (IsNear(patch, x_in_cam, squared_radius)) return true;
       }
     }
     return false;
@@ -95,16 +98,17 @@ class SupportIndex {
     return {(x * z - reach) / denominator, (x * z + reach) / denominator};
   }
 
-  bool IsNear(int column, int row, const Eigen::Vector3d& x_in_cam, double squared_radius) const {
-    const double z = surface_.depth[static_cast<size_t>(surface_.lattice.Index(column, row))];
-    if (!(z > 0)) return false;
-    const double dx = z * ray_x_[static_cast<size_t>(column)] - x_in_cam.x();
-    const double dy = z * ray_y_[static_cast<size_t>(row)] - x_in_cam.y();
+  bool IsNear(int32_t patch, const Eigen::Vector3d& x_in_cam, double squared_radius) const {
+    const auto at = static_cast<size_t>(patch);
+    const double z = surface_.depth[at];
+    const double dx = z * ray_x_[static_cast<size_t>(surface_.Column(at))] - x_in_cam.x();
+    const double dy = z * ray_y_[static_cast<size_t>(surface_.Row(at))] - x_in_cam.y();
     const double dz = z - x_in_cam.z();
     return dx * dx + dy * dy + dz * dz <= squared_radius;
   }
 
-  const PatchLattice& surface_;
+  const SparseSurface& surface_;
+  const PatchFinder finder_;
   std::vector<double> ray_x_;  // per column: x / z of the node's ray
   std::vector<double> ray_y_;  // per row
 };
@@ -118,7 +122,7 @@ struct Votes {
 uint8_t OneMore(uint8_t count) { return count < 255 ? static_cast<uint8_t>(count + 1) : count; }
 
 // Adds one supporter's votes.
-void CountVotes(const PatchLattice& filtered, const PatchLattice& supporter, const AcceptanceOptions& options,
+void CountVotes(const PatchLattice& filtered, const SparseSurface& supporter, const AcceptanceOptions& options,
                 std::vector<Votes>& votes, ThreadPool& pool) {
   const SupportIndex index(supporter);
   const Camera& reference = filtered.camera;
@@ -187,7 +191,7 @@ absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int
   result.patches_filtered = filtered.CountPatches();
   std::vector<Votes> votes(filtered.depth.size());
   for (int i = 0; i < supporters && result.patches_filtered > 0; ++i) {
-    MW_ASSIGN_OR_RETURN(const std::shared_ptr<const PatchLattice> supporter, load(i));
+    MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> supporter, load(i));
     MW_CHECK(supporter != nullptr && supporter->camera_index != filtered.camera_index);
     ++result.supporters_loaded;
     CountVotes(filtered, *supporter, options, votes, pool);

@@ -9,6 +9,7 @@
 
 #include "common/base/thread_pool.h"
 #include "common/surface/patch_lattice.h"
+#include "common/surface/sparse_surface.h"
 
 namespace meshwright {
 
@@ -28,7 +29,7 @@ struct AcceptanceResult {
 };
 
 // Gives the i-th surface asked for. Whoever calls decides what is kept in memory; acceptance holds one at a time.
-using SurfaceLoader = std::function<absl::StatusOr<std::shared_ptr<const PatchLattice>>(int i)>;
+using SurfaceLoader = std::function<absl::StatusOr<std::shared_ptr<const SparseSurface>>(int i)>;
 
 // M_r: a patch of F_r is accepted when at least k_a supporters have a filtered patch in the ball of radius
 // support_radius_steps * d_r(X) around its centre X. Links stay where both ends do. Errors are the loader's.

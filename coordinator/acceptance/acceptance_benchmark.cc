@@ -22,9 +22,10 @@ void BM_AcceptSurface(benchmark::State& state) {
   const bool agree = state.range(0) == 1;
   ThreadPool pool(static_cast<int>(state.range(1)));
   const PatchLattice filtered = Plane(0, 0, 0);
-  std::vector<std::shared_ptr<const PatchLattice>> supporters;
+  std::vector<std::shared_ptr<const SparseSurface>> supporters;
   for (int i = 1; i <= 6; ++i) {
-    supporters.push_back(std::make_shared<const PatchLattice>(Plane(i, 0.1 * i, agree ? 0.001 : 0.2)));
+    supporters.push_back(
+        std::make_shared<const SparseSurface>(SparseSurface::From(Plane(i, 0.1 * i, agree ? 0.001 : 0.2))));
   }
   for (auto _ : state) {
     auto result = AcceptSurface(

@@ -53,8 +53,8 @@ PatchLattice RandomSurface(CameraIndex index, const Camera& camera, int step, do
 }
 
 SurfaceLoader LoaderOf(const std::vector<PatchLattice>& surfaces) {
-  return [&surfaces](int i) -> absl::StatusOr<std::shared_ptr<const PatchLattice>> {
-    return std::make_shared<const PatchLattice>(surfaces[static_cast<size_t>(i)]);
+  return [&surfaces](int i) -> absl::StatusOr<std::shared_ptr<const SparseSurface>> {
+    return std::make_shared<const SparseSurface>(SparseSurface::From(surfaces[static_cast<size_t>(i)]));
   };
 }
 

@@ -12,15 +12,15 @@
 namespace meshwright {
 namespace {
 
-absl::StatusOr<std::shared_ptr<const PatchLattice>> LoadSurface(BlobStore& blobs, const std::string& digest,
-                                                                CameraIndex expected_camera) {
+absl::StatusOr<std::shared_ptr<const SparseSurface>> LoadSurface(BlobStore& blobs, const std::string& digest,
+                                                                 CameraIndex expected_camera) {
   MW_ASSIGN_OR_RETURN(const std::string bytes, blobs.Get(digest));
-  MW_ASSIGN_OR_RETURN(PatchLattice surface, DecodeSurface(bytes));
+  MW_ASSIGN_OR_RETURN(SparseSurface surface, DecodeSparseSurface(bytes));
   if (surface.camera_index != expected_camera) {
     return absl::DataLossError(absl::StrCat("surface ", digest, " is of camera ", surface.camera_index,
                                             ", expected camera ", expected_camera));
   }
-  return std::make_shared<const PatchLattice>(std::move(surface));
+  return std::make_shared<const SparseSurface>(std::move(surface));
 }
 
 std::string Name(SequenceNumber sequence) { return absl::StrCat("camera job ", sequence); }
@@ -195,7 +195,7 @@ absl::Status Conductor::CommitWhatIsNext() {
 
 // Section 3.7: what of F_r is supported by the filtered surfaces of enough cameras committed before becomes M_r.
 absl::StatusOr<Commit> Conductor::Accept(const Assignment& assignment, const std::string& filtered_digest) {
-  MW_ASSIGN_OR_RETURN(const std::shared_ptr<const PatchLattice> filtered,
+  MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> filtered,
                       LoadSurface(*blobs_, filtered_digest, assignment.camera));
   struct Supporter {
     CameraIndex camera = 0;
@@ -213,8 +213,9 @@ absl::StatusOr<Commit> Conductor::Accept(const Assignment& assignment, const std
     const Supporter& supporter = supporters[static_cast<size_t>(i)];
     return LoadSurface(*blobs_, supporter.digest, supporter.camera);
   };
-  MW_ASSIGN_OR_RETURN(const AcceptanceResult result,
-                      AcceptSurface(*filtered, static_cast<int>(supporters.size()), load, options_.acceptance, *pool_));
+  MW_ASSIGN_OR_RETURN(
+      const AcceptanceResult result,
+      AcceptSurface(filtered->ToLattice(), static_cast<int>(supporters.size()), load, options_.acceptance, *pool_));
   Commit commit = {.sequence = assignment.sequence,
                    .camera = assignment.camera,
                    .filtered_patches = result.patches_filtered,
@@ -258,7 +259,6 @@ CameraJobSpec Conductor::SpecFor(const Assignment& assignment, int64_t epoch) co
     if (found == committed_.end() || found->second.accepted.patches == 0) continue;
     if (found->second.accepted.sequence <= assignment.snapshot) spec.accepted.push_back(found->second.accepted);
   }
-  KeepLargest(options_.max_surfaces, spec.accepted);
   return spec;
 }
 

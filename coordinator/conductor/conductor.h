@@ -33,10 +33,9 @@ struct ConductorOptions {
   TargetSelectionOptions targets;
   int window = ScheduleOptions{}.window;  // W of the order rule, >= 1
   AcceptanceOptions acceptance;           // its k_a is also the K_a of the order rule
-  // Surfaces of overlapping cameras that one job looks at: for V_r the largest accepted ones, for acceptance the
-  // largest filtered ones, >= 1. In a dense set hundreds of cameras overlap each other and nearly all surface is in a
-  // few; what is left out may be grown once more, and the effort for a camera stays bounded whatever the size of the
-  // set.
+  // Filtered surfaces of overlapping cameras that acceptance holds one camera's against, the largest ones, >= 1. In a
+  // dense set hundreds of cameras overlap each other and nearly all surface is in a few. V_r has no such limit:
+  // accepted surfaces hardly overlap, so that all of them together are no larger than what the camera sees.
   int max_surfaces = 32;
 
   absl::Status Validate() const;
