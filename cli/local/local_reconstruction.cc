@@ -18,7 +18,7 @@
 #include "common/base/files.h"
 #include "common/base/process_usage.h"
 #include "common/base/status_macros.h"
-#include "common/mesh/surface_union.h"
+#include "common/mesh/surface_mesh.h"
 #include "common/scene/scene_check.h"
 #include "common/scene/view.h"
 #include "coordinator/conductor/accepted_mesh.h"
