@@ -9,7 +9,7 @@
 
 #include "common/base/files.h"
 #include "common/base/little_endian.h"
-#include "common/mesh/surface_union.h"
+#include "common/mesh/surface_mesh.h"
 #include "common/surface/random_surface_testing.h"
 
 namespace meshwright {

@@ -7,7 +7,7 @@
 #include "common/base/status_macros.h"
 #include "common/mesh/glb.h"
 #include "common/mesh/ply.h"
-#include "common/mesh/surface_union.h"
+#include "common/mesh/surface_mesh.h"
 #include "common/surface/codec.h"
 #include "coordinator/rest/json.h"
 #include "coordinator/rest/part_preview.h"
