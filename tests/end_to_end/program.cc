@@ -113,14 +113,18 @@ std::vector<std::string> ListFolder(const std::string& path) {
 const std::string& SharedScene(const std::string& name) {
   static const TemporaryFolder folder;
   static std::map<std::string, std::string> made;
+  static const std::map<std::string, std::vector<std::string>> kSynthesized = {
+      {"small", {"facade", "--cameras", "8", "--width", "480", "--height", "360"}},
+      {"turn", {"ring", "--cameras", "24", "--width", "400", "--height", "300"}},
+      {"facade", {"facade"}},
+      {"ring", {"ring"}},
+  };
   const auto found = made.find(name);
   if (found != made.end()) return found->second;
   const std::string path = folder / name;
-  std::vector<std::string> arguments = {"synthesize", name == "small" ? "facade" : name, "-o", path};
-  if (name == "small") {
-    for (const char* argument : {"--cameras", "8", "--width", "480", "--height", "360"})
-      arguments.emplace_back(argument);
-  }
+  std::vector<std::string> arguments = {"synthesize", "-o", path};
+  const std::vector<std::string>& what = kSynthesized.at(name);
+  arguments.insert(arguments.end(), what.begin(), what.end());
   const RunResult result = RunMeshwright(arguments);
   MW_CHECK(result.exit_code == 0);
   return made[name] = path;

@@ -51,7 +51,8 @@ void WriteBytes(const std::string& path, const std::string& bytes);
 // Names of all files and folders in a folder, sorted.
 std::vector<std::string> ListFolder(const std::string& path);
 
-// The scenes that tests share, made once a program: "small" (8 photographs of 480x360 of a facade), "facade", "ring".
+// The scenes that tests share, made once a program: "small" (8 photographs of 480x360 of a facade), "turn" (24 of
+// 400x300 around an object), "facade", "ring".
 const std::string& SharedScene(const std::string& name);
 
 }  // namespace meshwright::end_to_end
