@@ -135,7 +135,7 @@ void LossAccounting::RecordJob(const CameraJobInput& input, const CameraJobOptio
   const DepthMap& truth = truth_[camera];
   const auto nodes = truth.depth.size();
   MW_CHECK(filtered.depth.size() == nodes && grown.first.size() == nodes);
-  const PatchScorer scorer = MakeScorer(input, options);
+  const PatchScorer scorer = MakeScorer(input, options.scoring);
   std::vector<Outcome> outcomes(nodes, Outcome::kUnknown);
   pool.ParallelFor(static_cast<int64_t>(nodes), 4096, [&](int64_t begin, int64_t end) {
     for (auto node = static_cast<size_t>(begin); node < static_cast<size_t>(end); ++node) {

@@ -79,6 +79,10 @@ void VisitOptions(Options& options, Visitor&& visit) {
   visit(group, "mrf-margin", filtering.trws.margin_nodes, "what is solved around a window, lattice nodes");
   visit(group, "refinement-rounds", filtering.refinement.rounds,
         "rounds of moving depth to the peak of photo-consistency; 0 keeps the paper's steps");
+  visit(group, "refinement-radius", filtering.refinement.window_radius,
+        "in which patches are compared on (2 s + 1)^2 pixels with this s");
+  visit(group, "smoothing-radius", filtering.refinement.smoothing_radius_steps,
+        "depths are then fitted to neighbours this near at most, lattice steps; 0 leaves them as they are");
 
   group = "Acceptance (3.7)";
   visit(group, "max-surfaces", options.conductor.max_surfaces,

@@ -51,10 +51,10 @@ absl::Status CameraJobOptions::Validate() const {
   return filtering.Validate();
 }
 
-PatchScorer MakeScorer(const CameraJobInput& input, const CameraJobOptions& options) {
+PatchScorer MakeScorer(const CameraJobInput& input, const PatchScorer::Options& options) {
   std::vector<ScoredView> targets;
   for (const JobView& target : input.targets) targets.push_back({target.camera, target.grey});
-  return PatchScorer({input.reference.camera, input.reference.grey}, std::move(targets), options.scoring);
+  return PatchScorer({input.reference.camera, input.reference.grey}, std::move(targets), options);
 }
 
 CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
@@ -69,7 +69,7 @@ CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJo
   CameraJobReport& report = result.report;
   StageTimer timer;
   const Camera& reference = input.reference.camera;
-  const PatchScorer scorer = MakeScorer(input, options);
+  const PatchScorer scorer = MakeScorer(input, options.scoring);
   report.rays = input.accepted.lattice.nodes();
   report.rays_covered_before =
       std::count_if(input.accepted.depth.begin(), input.accepted.depth.end(), [](float z) { return z > 0; });
@@ -99,7 +99,10 @@ CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJo
   report.mrf_energy = filtering.energy;
   report.mrf_lower_bound = filtering.lower_bound;
   report.seconds_filtering = timer.Lap();
-  report.tentative_patches_scored += RefineSurface(scorer, options.filtering.refinement, filtering.surface, pool);
+  PatchScorer::Options fine_scoring = options.scoring;
+  fine_scoring.window_radius = options.filtering.refinement.window_radius;
+  const PatchScorer fine_scorer = MakeScorer(input, fine_scoring);
+  report.tentative_patches_scored += RefineSurface(fine_scorer, options.filtering.refinement, filtering.surface, pool);
   result.filtered =
       MakeFilteredSurface(filtering.surface, input.reference.camera_index, reference, *input.reference_color);
   report.rays_filtered = result.filtered.CountPatches();

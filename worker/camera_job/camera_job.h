@@ -86,7 +86,7 @@ CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJo
                                      ThreadPool& pool);
 
 // What the job compares photographs with.
-PatchScorer MakeScorer(const CameraJobInput& input, const CameraJobOptions& options);
+PatchScorer MakeScorer(const CameraJobInput& input, const PatchScorer::Options& options);
 
 // Bytes that RunCameraJob will need at most beside its input, for a reference of this size.
 int64_t EstimateCameraJobBytes(const Camera& reference, const CameraJobOptions& options);

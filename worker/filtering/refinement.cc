@@ -8,46 +8,49 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "worker/filtering/smoothing.h"
+
 namespace meshwright {
 namespace {
 
 // Rows of the lattice per piece of work.
 constexpr int kRowsPerPiece = 4;
 constexpr float kMinStepGain = 1e-6F;
+// Of a refined depth, pixel footprints; and of one that could not be refined.
+constexpr float kMinUncertainty = 0.02F;
+constexpr float kMaxUncertainty = 4;
+constexpr float kUnrefinedUncertainty = 1;
+// A depth that is less certain is dropped, pixel footprints: where there is next to no texture photo-consistency agrees
+// with itself at any depth, and neighbouring views of a dark background confirm each other's inventions.
+constexpr float kMaxKeptUncertainty = 1;
 
-struct ViewScores {
-  std::array<float, 32> ncc{};
+// The targets that may vote, and their mean score.
+struct Voters {
+  uint32_t sigma = 0;
+  float quality = 0;
 };
 
-float MeanNcc(const PatchScorer& scorer, const PatchScorer::Window& window, int x, int y, const PatchPlane& plane,
-              uint32_t sigma) {
-  float sum = 0;
-  int count = 0;
-  for (uint32_t rest = sigma; rest != 0; rest &= rest - 1) {
-    const float ncc = scorer.Score(window, x, y, plane, __builtin_ctz(rest));
-    if (ncc == PatchScorer::kNoScore) return PatchScorer::kNoScore;
-    sum += ncc;
-    ++count;
-  }
-  return count > 0 ? sum / static_cast<float>(count) : PatchScorer::kNoScore;
-}
-
 // Sigma anew: every target may vote that agrees, an occluded view does not.
-uint32_t SelectViews(const PatchScorer& scorer, const PatchScorer::Window& window, int x, int y,
-                     const PatchPlane& plane, const RefinementOptions& options) {
-  ViewScores scores;
+Voters SelectViews(const PatchScorer& scorer, const PatchScorer::Window& window, int x, int y, const PatchPlane& plane,
+                   const RefinementOptions& options) {
+  std::array<float, 32> scores{};
   float best = -1;
   for (int target = 0; target < scorer.targets(); ++target) {
-    scores.ncc[static_cast<size_t>(target)] = scorer.Score(window, x, y, plane, target);
-    best = std::max(best, scores.ncc[static_cast<size_t>(target)]);
+    scores[static_cast<size_t>(target)] = scorer.Score(window, x, y, plane, target);
+    best = std::max(best, scores[static_cast<size_t>(target)]);
   }
   const float threshold =
       std::max(static_cast<float>(options.min_view_quality), best - static_cast<float>(options.max_view_deficit));
-  uint32_t sigma = 0;
+  Voters voters;
+  int count = 0;
   for (int target = 0; target < scorer.targets(); ++target) {
-    if (scores.ncc[static_cast<size_t>(target)] >= threshold) sigma |= uint32_t{1} << target;
+    if (scores[static_cast<size_t>(target)] < threshold) continue;
+    voters.sigma |= uint32_t{1} << target;
+    voters.quality += scores[static_cast<size_t>(target)];
+    ++count;
   }
-  return sigma;
+  if (count > 0) voters.quality /= static_cast<float>(count);
+  return voters;
 }
 
 // Inverse depth that moves the patch by one pixel in the target of Sigma where it moves most.
@@ -65,6 +68,14 @@ absl::Status RefinementOptions::Validate() const {
   if (rounds < 0 || rounds > 8) {
     return absl::InvalidArgumentError(absl::StrCat("refinement.rounds is ", rounds, ", expected 0..8"));
   }
+  if (window_radius < 1 || window_radius > 7) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("refinement.window_radius is ", window_radius, " px, expected 1..7"));
+  }
+  if (smoothing_radius_steps < 0 || smoothing_radius_steps > 8) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("refinement.smoothing_radius_steps is ", smoothing_radius_steps, ", expected 0..8"));
+  }
   if (!(first_step_px > 0)) {
     return absl::InvalidArgumentError(absl::StrCat("refinement.first_step_px is ", first_step_px, ", expected > 0"));
   }
@@ -77,9 +88,17 @@ absl::Status RefinementOptions::Validate() const {
 
 namespace {
 
-// One step of depth at one node: a parabola through three scores, taken when it does not lower the score.
+// Standard deviation of a depth found as the peak of photo-consistency, in the units of the step between scores: noise
+// that lowers the peak to `quality` moves it the more the flatter it is.
+float PeakUncertainty(float quality, float curvature) {
+  constexpr float kIndependentPixels = 20;
+  const float q = std::clamp(quality, 0.05F, 0.999F);
+  return std::sqrt((1 - q) / (q * std::max(-curvature, 1e-4F) * kIndependentPixels));
+}
+
+// One step of depth at one node: a parabola through three scores. `uncertainty` is in pixel footprints.
 int64_t RefineDepth(const PatchScorer& scorer, const RefinementOptions& options, float step_px, int64_t node,
-                    SurfaceEstimate& surface) {
+                    SurfaceEstimate& surface, float& uncertainty) {
   const auto i = static_cast<size_t>(node);
   const int x = surface.lattice.PixelX(static_cast<int>(node % surface.lattice.columns));
   const int y = surface.lattice.PixelY(static_cast<int>(node / surface.lattice.columns));
@@ -87,14 +106,13 @@ int64_t RefineDepth(const PatchScorer& scorer, const RefinementOptions& options,
   PatchScorer::Window window;
   scorer.MakeWindow(x, y, window);
   if (!window.usable) return 0;
-  const uint32_t sigma = SelectViews(scorer, window, x, y, plane, options);
+  const auto [sigma, q] = SelectViews(scorer, window, x, y, plane, options);
   if (sigma == 0) return 1;
   surface.sigma[i] = sigma;
-  const float step = step_px * InverseDepthPerPixel(scorer, x, y, plane, sigma);
-  const float q = MeanNcc(scorer, window, x, y, plane, sigma);
-  const float nearer = MeanNcc(scorer, window, x, y, {plane.w + step, plane.gx, plane.gy}, sigma);
-  const float further = MeanNcc(scorer, window, x, y, {plane.w - step, plane.gx, plane.gy}, sigma);
   surface.quality[i] = q;
+  const float step = step_px * InverseDepthPerPixel(scorer, x, y, plane, sigma);
+  const float nearer = scorer.MeanScore(window, x, y, {plane.w + step, plane.gx, plane.gy}, sigma);
+  const float further = scorer.MeanScore(window, x, y, {plane.w - step, plane.gx, plane.gy}, sigma);
   if (nearer == PatchScorer::kNoScore || further == PatchScorer::kNoScore) return 3;
   const float curvature = nearer - 2 * q + further;
   float offset = 0;
@@ -105,6 +123,9 @@ int64_t RefineDepth(const PatchScorer& scorer, const RefinementOptions& options,
   }
   plane.w += offset * step;
   surface.quality[i] = std::max({q, nearer, further});
+  const float footprint = plane.w / static_cast<float>(scorer.reference().focal());  // in inverse depth
+  uncertainty =
+      std::clamp(PeakUncertainty(surface.quality[i], curvature) * step / footprint, kMinUncertainty, kMaxUncertainty);
   return 3;
 }
 
@@ -140,6 +161,20 @@ PatchPlane FitToNeighbours(const SurfaceEstimate& surface, const std::vector<Pat
   return {own.w, (syy * sx - sxy * sy) * scale, (sxx * sy - sxy * sx) * scale};
 }
 
+void DropUncertain(const std::vector<float>& uncertainty, SurfaceEstimate& surface) {
+  const Lattice& lattice = surface.lattice;
+  const auto columns = static_cast<size_t>(lattice.columns);
+  for (size_t node = 0; node < uncertainty.size(); ++node) {
+    if (uncertainty[node] <= kMaxKeptUncertainty) continue;
+    surface.plane[node] = {};
+    surface.quality[node] = 0;
+    surface.sigma[node] = 0;
+    surface.links[node] = 0;
+    if (node % columns > 0) surface.links[node - 1] &= static_cast<uint8_t>(~PatchLattice::kLinkRight);
+    if (node >= columns) surface.links[node - columns] &= static_cast<uint8_t>(~PatchLattice::kLinkDown);
+  }
+}
+
 }  // namespace
 
 int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& options, SurfaceEstimate& surface,
@@ -155,10 +190,12 @@ int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& option
       }
     });
   };
-  float step_px = static_cast<float>(options.first_step_px);
+  std::vector<float> uncertainty(surface.plane.size(), kUnrefinedUncertainty);
+  auto step_px = static_cast<float>(options.first_step_px);
   for (int round = 0; round < options.rounds; ++round) {
     over_rows([&](int column, int row) {
-      scored += RefineDepth(scorer, options, step_px, lattice.Index(column, row), surface);
+      const int64_t node = lattice.Index(column, row);
+      scored += RefineDepth(scorer, options, step_px, node, surface, uncertainty[static_cast<size_t>(node)]);
     });
     const std::vector<PatchPlane> refined = surface.plane;
     over_rows([&](int column, int row) {
@@ -169,6 +206,10 @@ int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& option
     });
     step_px *= 0.5F;
   }
+  if (options.rounds > 0 && options.smoothing_radius_steps > 0) {
+    SmoothDepth(uncertainty, scorer.reference().focal(), options.smoothing_radius_steps, surface, pool);
+  }
+  DropUncertain(uncertainty, surface);
   return scored;
 }
 

@@ -17,12 +17,16 @@ struct RefinementOptions {
   double first_step_px = 0.5;     // movement in the target with the widest baseline that the first round tries, px, > 0
   double min_view_quality = 0.5;  // a target below this NCC does not vote, -1..1
   double max_view_deficit = 0.25;  // nor one this much below the best target, 0..2
+  int window_radius = 2;  // px, of the windows compared, 1..7: grown patches are near the truth, where small windows
+                          // lose little and follow the surface better than those of growing
   int slope_radius_steps = 2;      // normals from linked neighbours this near, lattice steps, 1..8
+  int smoothing_radius_steps = 2;  // depths are fitted to neighbours this near at most, 0 leaves them, 0..8
 
   absl::Status Validate() const;
 };
 
-// Refines depth, normal and Sigma of every patch in place. Returns how many tentative patches were scored.
+// Refines depth, normal and Sigma of every patch in place, by scores of `scorer`, whose windows are of
+// options.window_radius. Returns how many tentative patches were scored.
 int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& options, SurfaceEstimate& surface,
                       ThreadPool& pool);
 

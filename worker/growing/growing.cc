@@ -107,7 +107,7 @@ class Grower {
       std::array<float, 3> q{};
       for (int k = -1; k <= 1; ++k) {
         const PatchPlane tentative{on_plane.w - static_cast<float>(k) * step, fitted.gx, fitted.gy};
-        q[static_cast<size_t>(k + 1)] = MeanNcc(window, x, y, tentative, p.sigma);
+        q[static_cast<size_t>(k + 1)] = scorer_.MeanScore(window, x, y, tentative, p.sigma);
         ++scored;
       }
       int best = 1;
@@ -125,18 +125,6 @@ class Grower {
       candidate.proposed = !IsBehindAccepted(node, candidate.patch.plane.w);
     }
     return scored;
-  }
-
-  float MeanNcc(const PatchScorer::Window& window, int x, int y, const PatchPlane& plane, uint32_t sigma) const {
-    float sum = 0;
-    int count = 0;
-    for (uint32_t rest = sigma; rest != 0; rest &= rest - 1) {
-      const float ncc = scorer_.Score(window, x, y, plane, __builtin_ctz(rest));
-      if (ncc == PatchScorer::kNoScore) return PatchScorer::kNoScore;
-      sum += ncc;
-      ++count;
-    }
-    return count > 0 ? sum / static_cast<float>(count) : PatchScorer::kNoScore;
   }
 
   // Conditions that need no score: (1) nothing of this seed on the ray yet, (4) nothing within d_r, (5) room.

@@ -1,6 +1,7 @@
 #include "worker/photo_consistency/patch_scorer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -205,6 +206,16 @@ float PatchScorer::Score(const Window& window, int x, int y, const PatchPlane& p
   input.quads = level.quads.data();
   input.stride = level.width;
   return Ncc(input);
+}
+
+float PatchScorer::MeanScore(const Window& window, int x, int y, const PatchPlane& plane, uint32_t sigma) const {
+  float sum = 0;
+  for (uint32_t rest = sigma; rest != 0; rest &= rest - 1) {
+    const float ncc = Score(window, x, y, plane, std::countr_zero(rest));
+    if (ncc == kNoScore) return kNoScore;
+    sum += ncc;
+  }
+  return sigma != 0 ? sum / static_cast<float>(std::popcount(sigma)) : kNoScore;
 }
 
 double PatchScorer::ApicalAngle(int x, int y, float inverse_depth, int target) const {

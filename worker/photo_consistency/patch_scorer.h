@@ -76,6 +76,10 @@ class PatchScorer {
   // NCC in [-1, 1] between the window around the centre of pixel (x, y) and target i through the plane, or kNoScore.
   float Score(const Window& window, int x, int y, const PatchPlane& plane, int target) const;
 
+  // q(p) of section 3.6: mean of the scores in the targets of `sigma` (bit i: target i), at least one. kNoScore when
+  // any of them has none.
+  float MeanScore(const Window& window, int x, int y, const PatchPlane& plane, uint32_t sigma) const;
+
   // Angle at the patch between the rays to the reference and to target i, radians.
   double ApicalAngle(int x, int y, float inverse_depth, int target) const;
 

@@ -188,6 +188,26 @@ TEST(PatchScorer, NoScoreWhereThereIsNothingToCompare) {
   EXPECT_FALSE(window.usable);
 }
 
+TEST(PatchScorer, MeanScoreIsTheMeanOfTheScores) {
+  const TwoViews views;
+  const Camera blind = MakeCamera(140, 110, {0, 0, 50}, 0);  // behind every plane
+  const auto target_image = std::make_shared<SamplingImage>(views.target_image, 1);
+  const PatchScorer scorer({views.reference, std::make_shared<SamplingImage>(views.reference_image, 1)},
+                           {{views.target, target_image}, {views.reference, target_image}, {blind, target_image}},
+                           {.window_radius = 3});
+  PatchScorer::Window window;
+  scorer.MakeWindow(60, 50, window);
+  const PatchPlane plane{0.4F, 0, 0};
+  const float first = scorer.Score(window, 60, 50, plane, 0);
+  const float second = scorer.Score(window, 60, 50, plane, 1);
+  ASSERT_NE(first, PatchScorer::kNoScore);
+  ASSERT_NE(second, PatchScorer::kNoScore);
+  EXPECT_FLOAT_EQ(scorer.MeanScore(window, 60, 50, plane, 0b11), (first + second) / 2);
+  EXPECT_EQ(scorer.MeanScore(window, 60, 50, plane, 0b10), second);
+  EXPECT_EQ(scorer.MeanScore(window, 60, 50, plane, 0b111), PatchScorer::kNoScore);
+  EXPECT_EQ(scorer.MeanScore(window, 60, 50, plane, 0), PatchScorer::kNoScore);
+}
+
 TEST(PatchPlane, NormalRoundTrip) {
   const Camera camera = MakeCamera(120, 100, {0, 0, 0}, 0);
   std::mt19937 generator(5);
