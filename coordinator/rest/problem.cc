@@ -146,11 +146,14 @@ std::string ProblemJson(const absl::Status& status) {
 absl::Status StatusOfHttp(int http_status) {
   const char* title = TitleOf(http_status);
   switch (http_status) {
+    case 400:
+      return absl::InvalidArgumentError("the request cannot be read as HTTP/1.1");
     case 404:
       return absl::NotFoundError("there is nothing at this path");
-    case 413:
-      return HttpError(413,
-                       absl::InvalidArgumentError("the request's body is larger than anything that is taken here"));
+    case 414:
+      return HttpError(414, absl::InvalidArgumentError("the path is longer than anything that is there"));
+    case 416:
+      return FieldError("Range", HttpError(416, absl::OutOfRangeError("Range cannot be understood")));
     default:
       break;
   }

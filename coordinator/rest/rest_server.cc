@@ -24,7 +24,6 @@ constexpr char kTokenCookie[] = "meshwright-token";
 // Each event stream holds a thread, and so does each connection that a client keeps for its next request.
 constexpr int kOtherConnections = 64;
 constexpr size_t kRequestsPerConnection = 1000;
-constexpr size_t kMaxBodyBytes = size_t{257} << 20;
 constexpr int64_t kMaxIgnoredBytes = int64_t{1} << 20;
 
 struct Address {
@@ -111,7 +110,6 @@ class RealRestServer final : public RestServer {
     server_.set_read_timeout(options_.patience_seconds);
     server_.set_write_timeout(options_.patience_seconds);
     server_.set_keep_alive_max_count(kRequestsPerConnection);
-    server_.set_payload_max_length(kMaxBodyBytes);
     server_.set_tcp_nodelay(true);  // events are small and must not wait for each other
     // The default shares the port with whoever else asks for it: two coordinators would answer in turns.
     server_.set_socket_options([](socket_t socket) {

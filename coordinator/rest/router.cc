@@ -17,6 +17,7 @@ namespace {
 
 constexpr char kRest[] = "{path}";
 constexpr size_t kQuoted = 64;
+constexpr int64_t kMaxDiscardedBytes = int64_t{4} << 20;
 
 std::vector<std::string> Segments(const std::string& path) { return absl::StrSplit(path, '/'); }
 
@@ -71,6 +72,10 @@ absl::StatusOr<int64_t> Number(const std::string& name, const std::string& text,
                                                               "\", expected a whole number ", least, "..", most)));
   }
   return value;
+}
+
+absl::Status TooLarge(int64_t most) {
+  return HttpError(413, absl::InvalidArgumentError(absl::StrCat("the body has more than ", most, " bytes")));
 }
 
 }  // namespace
@@ -130,21 +135,36 @@ absl::Status ReadContent(RestCall& call, int64_t most,
     CloseAfterwards(call);
     return HttpError(415, absl::InvalidArgumentError("the body is encoded or in several parts, expected it as it is"));
   }
+  const std::string length_text = call.request.get_header_value("Content-Length");
+  if (!length_text.empty()) {
+    int64_t length = 0;
+    const bool digits = length_text.find_first_not_of("0123456789") == std::string::npos;
+    if (!digits || !absl::SimpleAtoi(length_text, &length)) {
+      CloseAfterwards(call);
+      return FieldError("Content-Length",
+                        absl::InvalidArgumentError(absl::StrCat("Content-Length is \"", length_text.substr(0, kQuoted),
+                                                                "\", expected a whole number")));
+    }
+    // The library would wait for all of it.
+    if (length > most + kMaxDiscardedBytes) {
+      CloseAfterwards(call);
+      return TooLarge(most);
+    }
+  }
   absl::Status status;
   int64_t received = 0;
+  int64_t discarded = 0;
   const bool whole = (*call.content)([&](const char* bytes, size_t count) {
     received += static_cast<int64_t>(count);
-    if (received > most) {
-      status = HttpError(413, absl::InvalidArgumentError(absl::StrCat("the body has more than ", most, " bytes")));
-    } else {
-      status = take(absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes), count));
-    }
-    return status.ok();
+    if (status.ok() && received > most) status = TooLarge(most);
+    if (status.ok()) status = take(absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes), count));
+    // Whoever is still sending would not hear why: what is left is taken, within limits.
+    if (!status.ok()) discarded += static_cast<int64_t>(count);
+    return discarded <= kMaxDiscardedBytes;
   });
   if (!whole) CloseAfterwards(call);
   if (!status.ok()) return status;
   if (whole) return absl::OkStatus();
-  if (call.response.status == 413) return StatusOfHttp(413);
   return absl::InvalidArgumentError("the body ended early");
 }
 

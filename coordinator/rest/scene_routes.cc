@@ -9,6 +9,7 @@
 #include "common/image/encode.h"
 #include "common/image/resize.h"
 #include "coordinator/rest/json.h"
+#include "coordinator/rest/problem.h"
 #include "coordinator/rest/routes.h"
 
 namespace meshwright {
@@ -51,7 +52,9 @@ absl::Status GetFile(const RestContext& context, RestCall& call) {
 absl::Status PutFile(const RestContext& context, RestCall& call) {
   SceneFilePart part = {.path = call.path.at("path")};
   MW_ASSIGN_OR_RETURN(part.size_bytes, QueryNumber(call, "size", 0, kMaxFileBytes, -1));
-  if (part.size_bytes < 0) return absl::InvalidArgumentError("size_bytes is missing: the parameter size is expected");
+  if (part.size_bytes < 0) {
+    return FieldError("size", absl::InvalidArgumentError("size is missing, expected the bytes of the whole file"));
+  }
   MW_ASSIGN_OR_RETURN(part.offset_bytes, QueryNumber(call, "offset", 0, kMaxFileBytes, 0));
   part.sha256 = call.request.get_param_value("sha256");
   part.part_sha256 = call.request.get_param_value("partSha256");
