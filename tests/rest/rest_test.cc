@@ -1,0 +1,281 @@
+// The REST interface over real connections: a scene uploaded in parts, followed, looked at and downloaded.
+
+#include <set>
+#include <sstream>
+
+#include <gmock/gmock.h>
+
+#include "common/mesh/ply.h"
+#include "tests/rest/rest_cluster.h"
+
+namespace meshwright {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class RestTest : public RestCluster {
+ protected:
+  // All events until the stream ends, as (name, id, data).
+  struct Event {
+    std::string name;
+    std::string id;
+    Json data;
+  };
+  std::vector<Event> ReadEvents(const std::string& id, const httplib::Headers& headers = {}) {
+    httplib::Client client("127.0.0.1", coordinator_->rest_port());
+    client.set_read_timeout(60);
+    std::string text;
+    const auto result = client.Get("/v1/reconstructions/" + id + "/events", headers, [&](const char* bytes, size_t n) {
+      text.append(bytes, n);
+      return true;
+    });
+    EXPECT_TRUE(result) << "the stream did not end well";
+    std::vector<Event> events;
+    std::istringstream lines(text);
+    Event event;
+    for (std::string line; std::getline(lines, line);) {
+      if (line.rfind("id: ", 0) == 0) event.id = line.substr(4);
+      if (line.rfind("event: ", 0) == 0) event.name = line.substr(7);
+      if (line.rfind("data: ", 0) == 0) event.data = Json::parse(line.substr(6), nullptr, false);
+      if (line.empty() && !event.name.empty()) events.push_back(std::exchange(event, {}));
+    }
+    return events;
+  }
+  void Create(const std::string& id) {
+    const auto created = PostJson("/v1/reconstructions", R"({"id":")" + id + R"("})");
+    ASSERT_TRUE(created && created->status == 200) << (created ? created->body : "");
+  }
+};
+
+TEST_F(RestTest, FromAnInterruptedUploadToTheMesh) {
+  const std::string base = "/v1/reconstructions/c7";
+  Create("c7");
+  Create("c7");  // idempotent
+  EXPECT_EQ(PostJson("/v1/reconstructions", R"({"id":"c7","weight":3})")->status, 409);
+
+  // The first file in three parts. The coordinator goes down after the second one, which is then sent again.
+  const auto& [path, content] = SceneFiles().front();
+  const size_t third = content.size() / 3;
+  ASSERT_EQ(PutPart("c7", path, content, 0, third)->status, 200);
+  const auto skipped = PutPart("c7", path, content, 2 * third, content.size());
+  EXPECT_EQ(skipped->status, 409);
+  EXPECT_EQ(skipped->get_header_value("Upload-Offset"), std::to_string(third));
+  ASSERT_EQ(PutPart("c7", path, content, third, third)->status, 200);
+  Stop();
+  Start();
+  EXPECT_EQ(http_->Head(base + "/files/" + path)->get_header_value("Upload-Offset"), std::to_string(2 * third));
+  const auto repeated = PutPart("c7", path, content, third, third);
+  EXPECT_EQ(repeated->status, 200) << repeated->body;
+  EXPECT_EQ(repeated->get_header_value("Upload-Offset"), std::to_string(2 * third));
+  std::string damaged = content;
+  damaged[third] = static_cast<char>(damaged[third] + 1);
+  EXPECT_EQ(http_
+                ->Put(absl::StrCat(base, "/files/", path, "?size=", content.size(), "&sha256=", Sha256Hex(content),
+                                   "&offset=", third, "&partSha256=", Sha256Hex(damaged.substr(third, third))),
+                      damaged.substr(third, third), "application/octet-stream")
+                ->status,
+            409);
+  const auto last = PutPart("c7", path, content, 2 * third, content.size());
+  ASSERT_EQ(last->status, 200) << last->body;
+  EXPECT_TRUE(Json::parse(last->body)["complete"].get<bool>());
+  UploadScene("c7");  // the first file once more, and the others
+  EXPECT_EQ(GetJson(base + "/files")["files"].size(), SceneFiles().size());
+
+  EXPECT_EQ(http_->Get(base + "/mesh")->status, 409);
+  EXPECT_EQ(http_->Post(base + ":start")->status, 200);
+  EXPECT_EQ(http_->Post(base + ":start")->status, 200);
+  StartWorker();
+  const std::vector<Event> events = ReadEvents("c7");
+
+  // Parts come once each, in order; states in between; the end at the end.
+  ASSERT_GE(events.size(), 3U);
+  EXPECT_EQ(events.front().name, "reconstruction");
+  EXPECT_EQ(events.back().name, "end");
+  std::vector<Json> parts;
+  Json last_state;
+  for (const Event& event : events) {
+    if (event.name == "reconstruction") last_state = event.data["state"];
+    if (event.name != "part") continue;
+    EXPECT_EQ(event.id, std::to_string(event.data["sequence"].get<int>()));
+    if (!parts.empty()) {
+      EXPECT_GT(event.data["sequence"].get<int>(), parts.back()["sequence"].get<int>());
+    }
+    parts.push_back(event.data);
+  }
+  EXPECT_EQ(last_state, "RECONSTRUCTION_STATE_DONE");
+  ASSERT_FALSE(parts.empty());
+  EXPECT_EQ(GetJson(base + "/parts")["parts"], Json(parts));
+  // Who knows them is not told again.
+  const std::vector<Event> rest = ReadEvents("c7", {{"Last-Event-ID", events.back().id}});
+  ASSERT_EQ(rest.size(), 2U);
+  EXPECT_EQ(rest[0].name, "reconstruction");
+  EXPECT_EQ(rest[1].name, "end");
+
+  // The mesh, whole and in ranges.
+  const Json reconstruction = GetJson(base);
+  const std::string etag = "\"" + reconstruction["meshSha256"].get<std::string>() + "\"";
+  const auto mesh = http_->Get(base + "/mesh");
+  ASSERT_EQ(mesh->status, 200);
+  EXPECT_EQ(Sha256Hex(mesh->body), reconstruction["meshSha256"]);
+  EXPECT_EQ(mesh->get_header_value("ETag"), etag);
+  EXPECT_EQ(mesh->get_header_value("Content-Type"), "model/ply");
+  const auto middle = http_->Get(base + "/mesh", {{"Range", "bytes=100-199"}, {"If-Range", etag}});
+  EXPECT_EQ(middle->status, 206);
+  EXPECT_EQ(middle->body, mesh->body.substr(100, 100));
+  EXPECT_EQ(middle->get_header_value("Content-Range"), absl::StrCat("bytes 100-199/", mesh->body.size()));
+  EXPECT_EQ(http_->Get(base + "/mesh", {{"Range", "bytes=-50"}})->body, mesh->body.substr(mesh->body.size() - 50));
+  EXPECT_EQ(http_->Get(base + "/mesh", {{"Range", "bytes=5-9"}, {"If-Range", "\"old\""}})->status, 200);
+  EXPECT_EQ(http_->Get(base + "/mesh", {{"If-None-Match", etag}})->status, 304);
+  const auto beyond = http_->Get(base + "/mesh", {{"Range", absl::StrCat("bytes=", mesh->body.size(), "-")}});
+  EXPECT_EQ(beyond->status, 416);
+  EXPECT_EQ(beyond->get_header_value("Content-Range"), absl::StrCat("bytes */", mesh->body.size()));
+  const auto head = http_->Head(base + "/mesh");
+  EXPECT_EQ(head->get_header_value("Content-Length"), std::to_string(mesh->body.size()));
+  EXPECT_THAT(http_->Get(base + "/mesh.glb")->body, StartsWith("glTF"));
+
+  // One part: as PLY with all of its faces, and as a preview with few.
+  const std::string part = absl::StrCat(base, "/parts/", parts[0]["sequence"].get<int>());
+  const auto ply = ParsePly(http_->Get(part)->body, "part");
+  ASSERT_TRUE(ply.ok()) << ply.status();
+  EXPECT_FALSE(ply->faces.empty());
+  const auto preview = http_->Get(part + "/preview?max_faces=50");
+  EXPECT_THAT(preview->body, StartsWith("MWPV"));
+  EXPECT_LE(preview->body[20], 50);
+  EXPECT_EQ(http_->Get(part + "/preview?max_faces=50", {{"If-None-Match", preview->get_header_value("ETag")}})->status,
+            304);
+
+  const Json cameras = GetJson(base + "/cameras")["cameras"];
+  ASSERT_EQ(cameras.size(), 5U);
+  for (const Json& camera : cameras) {
+    EXPECT_EQ(camera["geometry"]["rotation"].size(), 9U);
+    EXPECT_EQ(camera["geometry"]["width"], 160);
+    EXPECT_GT(camera["shares"]["grown"].get<double>() + camera["shares"]["coveredBefore"].get<double>(), 0);
+  }
+  const auto photo = http_->Get(base + "/cameras/0/photo?width=40");
+  EXPECT_EQ(photo->get_header_value("Content-Type"), "image/jpeg");
+  EXPECT_THAT(photo->body, StartsWith("\xff\xd8"));
+  EXPECT_FALSE(GetJson(base + "/log")["entries"].empty());
+
+  EXPECT_EQ(http_->Delete(base)->status, 204);
+  EXPECT_EQ(http_->Get(base)->status, 404);
+}
+
+TEST_F(RestTest, TheMeshSoFarWhileItRuns) {
+  const std::string base = "/v1/reconstructions/early";
+  Create("early");
+  UploadScene("early");
+  ASSERT_EQ(http_->Post(base + ":start")->status, 200);
+  // Nobody works: no part has been accepted.
+  const auto none = http_->Get(base + "/mesh?partial=true");
+  ASSERT_EQ(none->status, 200) << none->body;
+  EXPECT_TRUE(ParsePly(none->body, "mesh")->faces.empty());
+  StartWorker();
+  std::set<size_t> faces;
+  while (GetJson(base)["state"] != "RECONSTRUCTION_STATE_DONE") {
+    const auto partial = http_->Get(base + "/mesh?partial=true");
+    ASSERT_EQ(partial->status, 200) << partial->body;
+    const auto mesh = ParsePly(partial->body, "mesh");
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    faces.insert(mesh->faces.size());
+  }
+  EXPECT_GE(faces.size(), 1U);
+  EXPECT_EQ(Sha256Hex(http_->Get(base + "/mesh?partial=true")->body), GetJson(base)["meshSha256"]);
+}
+
+TEST_F(RestTest, ListsInPages) {
+  for (const char* id : {"a", "b", "c"}) Create(id);
+  const Json first = GetJson("/v1/reconstructions?pageSize=2");
+  EXPECT_EQ(first["reconstructions"].size(), 2U);
+  const Json second = GetJson("/v1/reconstructions?pageToken=" + first["nextPageToken"].get<std::string>());
+  ASSERT_EQ(second["reconstructions"].size(), 1U);
+  EXPECT_EQ(second["reconstructions"][0]["id"], "c");
+  EXPECT_EQ(second["nextPageToken"], "");
+}
+
+TEST_F(RestTest, ADigestThatIsWrongMeansAllOfTheFileAgain) {
+  Create("d");
+  const std::string wrong(64, 'a');
+  const std::string file = "/v1/reconstructions/d/files/x.bin?size=6&sha256=";
+  const auto put = [&](const std::string& sha256, int offset, const std::string& part) {
+    return http_->Put(absl::StrCat(file, sha256, "&offset=", offset, "&partSha256=", Sha256Hex(part)), part,
+                      "application/octet-stream");
+  };
+  EXPECT_EQ(put(wrong, 0, "abc")->status, 200);
+  const auto refused = put(wrong, 3, "def");
+  EXPECT_EQ(refused->status, 422);
+  EXPECT_EQ(Json::parse(refused->body)["field"], "sha256");
+  EXPECT_EQ(refused->get_header_value("Upload-Offset"), "0");
+  EXPECT_EQ(put(Sha256Hex(std::string("abcdef")), 0, "abc")->status, 200);
+  EXPECT_EQ(put(Sha256Hex(std::string("abcdef")), 3, "def")->status, 200);
+}
+
+TEST_F(RestTest, ATokenIsAskedForWhenThereIsOne) {
+  Stop();
+  const std::string token = "0123456789abcdef";
+  ASSERT_TRUE(WriteFileAtomically(folder_ + "/token", token + "\n").ok());
+  settings_.api_token_file = folder_ + "/token";
+  Start();
+  EXPECT_EQ(http_->Get("/healthz")->status, 200);
+  const auto without = http_->Get("/v1/workers");
+  EXPECT_EQ(without->status, 401);
+  EXPECT_EQ(without->get_header_value("WWW-Authenticate"), "Bearer");
+  EXPECT_EQ(http_->Get("/v1/workers", {{"Authorization", "Bearer 0123456789abcdeX"}})->status, 401);
+  EXPECT_EQ(http_->Get("/v1/workers", {{"Authorization", "Bearer " + token}})->status, 200);
+  EXPECT_EQ(http_->Get("/v1/workers", {{"Cookie", "a=b; meshwright-token=" + token}})->status, 200);
+}
+
+TEST_F(RestTest, ServesThePageAndNothingBesideIt) {
+  Stop();
+  const std::string page = folder_ + "/page";
+  std::filesystem::create_directories(page + "/assets");
+  ASSERT_TRUE(WriteFileAtomically(page + "/index.html", "<title>page</title>").ok());
+  ASSERT_TRUE(WriteFileAtomically(page + "/assets/a-1f.js", "1").ok());
+  ASSERT_TRUE(WriteFileAtomically(folder_ + "/secret.txt", "secret").ok());
+  std::filesystem::create_symlink(folder_ + "/secret.txt", page + "/link.txt");
+  settings_.page_folder = page;
+  Start();
+  for (const char* path : {"/", "/reconstructions/c7", "/workers"}) {
+    const auto result = http_->Get(path);
+    EXPECT_EQ(result->status, 200) << path;
+    EXPECT_THAT(result->get_header_value("Content-Type"), StartsWith("text/html"));
+    EXPECT_EQ(result->get_header_value("Cache-Control"), "no-cache");
+  }
+  const auto script = http_->Get("/assets/a-1f.js");
+  EXPECT_THAT(script->get_header_value("Content-Type"), StartsWith("text/javascript"));
+  EXPECT_THAT(script->get_header_value("Cache-Control"), HasSubstr("immutable"));
+  for (const char* path : {"/../secret.txt", "/assets/../../secret.txt", "/%2e%2e/secret.txt", "/..%2fsecret.txt",
+                           "/link.txt", "//etc/passwd", "/assets/none.js", "/.hidden", "/v1/none", "/assets\\..\\x"}) {
+    EXPECT_EQ(http_->Get(path)->status, 404) << path;
+  }
+}
+
+TEST_F(RestTest, OptionsSayWhatIsAccepted) {
+  const Json options = GetJson("/v1/options")["options"];
+  ASSERT_GT(options.size(), 20U);
+  int tried = 0;
+  const auto create = [&](const Json& option, const Json& value) {
+    const Json request = {{"id", absl::StrCat("o", ++tried)},
+                          {"optionsJson", Json({{option["name"].get<std::string>(), value}}).dump()}};
+    return PostJson("/v1/reconstructions", request.dump())->status;
+  };
+  for (const Json& option : options) {
+    for (const char* bound : {"minimum", "maximum"}) {
+      if (option.contains(bound)) {
+        EXPECT_EQ(create(option, option[bound]), 200) << option;
+      }
+    }
+    for (const char* bound : {"exclusiveMinimum", "exclusiveMaximum"}) {
+      if (option.contains(bound)) {
+        EXPECT_EQ(create(option, option[bound]), 400) << option;
+      }
+    }
+    if (option["type"] == "integer" && option.contains("minimum")) {
+      EXPECT_EQ(create(option, option["minimum"].get<int64_t>() - 1), 400) << option;
+    }
+  }
+  EXPECT_GT(tried, 40);
+}
+
+}  // namespace
+}  // namespace meshwright
