@@ -90,6 +90,37 @@ TEST_F(FilteringTest, RefinementBringsDepthNearerToTheTruth) {
   EXPECT_LT(after, 0.35);
 }
 
+TEST_F(FilteringTest, RefinementDropsUncertainPatchesWithTheirLinks) {
+  FilteringResult result = Filter(2);
+  const SurfaceEstimate before = result.surface;
+  ThreadPool pool(2);
+  RefineSurface(views_->Scorer(), {}, result.surface, pool);
+  const SurfaceEstimate& after = result.surface;
+  int64_t dropped = 0;
+  int64_t dropped_wrong = 0;
+  int64_t kept = 0;
+  int64_t kept_wrong = 0;
+  for (int64_t node = 0; node < after.lattice.nodes(); ++node) {
+    if (!before.HasPatch(node)) {
+      EXPECT_FALSE(after.HasPatch(node));
+      continue;
+    }
+    const auto i = static_cast<size_t>(node);
+    const int wrong = views_->ErrorInSteps(node, before.plane[i].w) > 1 ? 1 : 0;
+    (after.HasPatch(node) ? kept : dropped) += 1;
+    (after.HasPatch(node) ? kept_wrong : dropped_wrong) += wrong;
+    if ((after.links[i] & PatchLattice::kLinkRight) != 0) {
+      EXPECT_TRUE(after.HasPatch(node) && after.HasPatch(node + 1));
+    }
+    if ((after.links[i] & PatchLattice::kLinkDown) != 0) {
+      EXPECT_TRUE(after.HasPatch(node) && after.HasPatch(node + after.lattice.columns));
+    }
+  }
+  ASSERT_GT(dropped, 0);
+  // What is dropped is wrong more often than what stays.
+  EXPECT_GT(dropped_wrong * kept, kept_wrong * dropped);
+}
+
 TEST_F(FilteringTest, NumberOfThreadsChangesNothing) {
   FilteringResult one = Filter(1);
   FilteringResult three = Filter(3);
