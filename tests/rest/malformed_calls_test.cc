@@ -125,7 +125,7 @@ TEST_F(MalformedCallsTest, OverHttp) {
       {"POST", there + ":begin", "", 405, "", "expected DELETE, GET, HEAD"},
       {"PATCH", there, "{}", 405, "", "expected DELETE, GET, HEAD"},
       {"GET", "/v1/nothing", "", 404, "", "nothing at this path"},
-      {"GET", "/v2", "", 404, "", "nothing at this path"},
+      {"GET", "/v2.json", "", 404, "", "nothing at this path"},
       // Uploading.
       {"PUT", file + "a", "x", 400, "size", "missing"},
       {"PUT", file + "a?size=-1&sha256=" + kSha, "x", 400, "size", "0.."},
