@@ -25,8 +25,8 @@ struct RefinementOptions {
   absl::Status Validate() const;
 };
 
-// Refines depth, normal and Sigma of every patch in place, by scores of `scorer`, whose windows are of
-// options.window_radius. Returns how many tentative patches were scored.
+// Refines depth, normal and Sigma of every patch in place, by scores of `scorer` (windows of options.window_radius),
+// and drops patches whose depth stays uncertain. Returns how many tentative patches were scored.
 int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& options, SurfaceEstimate& surface,
                       ThreadPool& pool);
 
