@@ -1,9 +1,9 @@
 // The page against simulated reconstructions: what it shows, how it is used, who can use it.
-import assert from "node:assert/strict";
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-import { after, before, beforeEach, test } from "node:test";
+import assert from 'node:assert/strict';
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, beforeEach, test } from 'node:test';
 import {
   DIST,
   PHONE,
@@ -14,8 +14,8 @@ import {
   openPage,
   until,
   violations,
-} from "./browser.js";
-import { FakeApi } from "./fake_api/server.js";
+} from './browser.js';
+import { FakeApi } from './fake_api/server.js';
 
 let browser;
 let api;
@@ -37,47 +37,36 @@ beforeEach(async (context) => {
   context.after(() => api.close());
 });
 
-test("every page and state is free of serious accessibility violations, dark and light, large and small", async (t) => {
+test('every page and state is free of serious accessibility violations, dark and light, large and small', async (t) => {
   const pages = [
-    ["reconstructions", "#/", ".list-row"],
-    ["running", "#/reconstructions/campaign", ".camera-row"],
-    ["done", "#/reconstructions/done", ".camera-row"],
-    ["failed", "#/reconstructions/broken", ".notice.danger"],
-    ["missing", "#/reconstructions/nothing", ".notice.danger"],
-    ["workers", "#/workers", ".worker"],
-    ["submit", "#/submit", ".option"],
-    ["unknown", "#/elsewhere", "h1"],
+    ['reconstructions', '#/', '.list-row'],
+    ['running', '#/reconstructions/campaign', '.camera-row'],
+    ['done', '#/reconstructions/done', '.camera-row'],
+    ['failed', '#/reconstructions/broken', '.notice.danger'],
+    ['missing', '#/reconstructions/nothing', '.notice.danger'],
+    ['workers', '#/workers', '.worker'],
+    ['submit', '#/submit', '.option'],
+    ['unknown', '#/elsewhere', 'h1'],
   ];
-  for (const colorScheme of ["light", "dark"]) {
+  for (const colorScheme of ['light', 'dark']) {
     for (const [name, hash, ready] of pages) {
       const page = await openPage(t, browser, base + hash, { colorScheme });
       await page.locator(ready).first().waitFor();
-      if (name === "running" || name === "done")
-        await until(async () => (await meshNumbers(page)).shown > 1000);
+      if (name === 'running' || name === 'done') await until(async () => (await meshNumbers(page)).shown > 1000);
       await keepScreenshot(page, `${name}-${colorScheme}`, { fullPage: true });
       assert.deepEqual(await violations(page), [], `${name}, ${colorScheme}`);
       await page.setViewportSize(PHONE);
       await page.waitForTimeout(200);
-      assert.deepEqual(
-        await violations(page),
-        [],
-        `${name}, ${colorScheme}, phone`,
-      );
-      const scroll = await page.evaluate(
-        () => document.documentElement.scrollWidth,
-      );
-      assert.ok(
-        scroll <= PHONE.width,
-        `${name} is ${scroll} px wide on a phone of ${PHONE.width} px`,
-      );
-      if (colorScheme === "light")
-        await keepScreenshot(page, `${name}-phone`, { fullPage: true });
+      assert.deepEqual(await violations(page), [], `${name}, ${colorScheme}, phone`);
+      const scroll = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.ok(scroll <= PHONE.width, `${name} is ${scroll} px wide on a phone of ${PHONE.width} px`);
+      if (colorScheme === 'light') await keepScreenshot(page, `${name}-phone`, { fullPage: true });
       await page.context().close();
     }
   }
 });
 
-test("the mesh grows while one looks at it", async (t) => {
+test('the mesh grows while one looks at it', async (t) => {
   const page = await openPage(t, browser, `${base}#/reconstructions/campaign`);
   const first = await until(async () => {
     const numbers = await meshNumbers(page);
@@ -85,188 +74,137 @@ test("the mesh grows while one looks at it", async (t) => {
   });
   const then = await until(async () => {
     const numbers = await meshNumbers(page);
-    return (
-      numbers.parts >= first.parts + 10 &&
-      numbers.shown > first.shown &&
-      numbers
-    );
+    return numbers.parts >= first.parts + 10 && numbers.shown > first.shown && numbers;
   });
   assert.ok(then.faces > first.faces);
-  const seen = Number(
-    (await page.locator(".summary dd").first().textContent()).split(" ")[0],
-  );
-  await until(
-    async () =>
-      Number(
-        (await page.locator(".summary dd").first().textContent()).split(" ")[0],
-      ) > seen,
-  );
+  const seen = Number((await page.locator('.summary dd').first().textContent()).split(' ')[0]);
+  await until(async () => Number((await page.locator('.summary dd').first().textContent()).split(' ')[0]) > seen);
 });
 
-test("colours switch between photographs, cameras and shape", async (t) => {
+test('colours switch between photographs, cameras and shape', async (t) => {
   const page = await openPage(t, browser, `${base}#/reconstructions/done`);
   await until(async () => (await meshNumbers(page)).parts === 60);
   await until(async () => (await meshNumbers(page)).shown > 100_000);
-  await page.getByRole("button", { name: "Frusta" }).click();
+  await page.getByRole('button', { name: 'Frusta' }).click();
   const looks = {};
-  for (const name of ["Photographs", "Cameras", "Shape"]) {
-    await page.getByRole("radio", { name, exact: true }).check({ force: true });
+  for (const name of ['Photographs', 'Cameras', 'Shape']) {
+    await page.getByRole('radio', { name, exact: true }).check({ force: true });
     await page.waitForTimeout(500);
     looks[name] = await looksOfCanvas(page);
-    assert.ok(
-      looks[name].drawn > 20_000,
-      `${name}: ${looks[name].drawn} pixels`,
-    );
+    assert.ok(looks[name].drawn > 20_000, `${name}: ${looks[name].drawn} pixels`);
     await keepScreenshot(page, `colours-${name.toLowerCase()}`);
   }
-  const distance = (a, b) =>
-    Math.hypot(...a.mean.map((value, k) => value - b.mean[k]));
+  const distance = (a, b) => Math.hypot(...a.mean.map((value, k) => value - b.mean[k]));
   assert.ok(distance(looks.Photographs, looks.Cameras) > 15);
   assert.ok(distance(looks.Cameras, looks.Shape) > 15);
 });
 
-test("a broken event stream comes back by itself and misses nothing", async (t) => {
+test('a broken event stream comes back by itself and misses nothing', async (t) => {
   const page = await openPage(t, browser, `${base}#/reconstructions/campaign`);
   await until(async () => (await meshNumbers(page)).parts > 0);
   api.breakStreams();
-  await page.getByText("Reconnecting").waitFor();
-  await page.getByText("Reconnecting").waitFor({ state: "detached" });
+  await page.getByText('Reconnecting').waitFor();
+  await page.getByText('Reconnecting').waitFor({ state: 'detached' });
   await until(async () => {
     const { parts } = await meshNumbers(page);
-    return (
-      Math.abs(parts - api.simulations.get("campaign").parts.length) <= 6 &&
-      parts > 0
-    );
+    return Math.abs(parts - api.simulations.get('campaign').parts.length) <= 6 && parts > 0;
   });
 });
 
-test("everything can be reached and done with the keyboard alone", async (t) => {
+test('everything can be reached and done with the keyboard alone', async (t) => {
   const page = await openPage(t, browser, base);
-  await page.locator(".list-row").first().waitFor();
-  await page.keyboard.press("Tab");
-  assert.equal(
-    await page.evaluate(() => document.activeElement.textContent.trim()),
-    "Skip to the content",
-  );
-  await page.keyboard.press("Enter");
-  await page.keyboard.press("Tab");
-  const focused = () =>
-    page.evaluate(() => document.activeElement.textContent.trim());
-  for (let i = 0; i < 20 && (await focused()) !== "done"; ++i)
-    await page.keyboard.press("Tab");
-  await page.keyboard.press("Enter");
-  await page.locator(".camera-row").first().waitFor();
-  assert.equal(await focused(), "done", "the heading has the focus");
+  await page.locator('.list-row').first().waitFor();
+  await page.keyboard.press('Tab');
+  assert.equal(await page.evaluate(() => document.activeElement.textContent.trim()), 'Skip to the content');
+  await page.keyboard.press('Enter');
+  await page.keyboard.press('Tab');
+  const focused = () => page.evaluate(() => document.activeElement.textContent.trim());
+  for (let i = 0; i < 20 && (await focused()) !== 'done'; ++i) await page.keyboard.press('Tab');
+  await page.keyboard.press('Enter');
+  await page.locator('.camera-row').first().waitFor();
+  assert.equal(await focused(), 'done', 'the heading has the focus');
   await until(async () => (await meshNumbers(page)).shown > 100_000);
 
   const tabTo = async (selector) => {
     for (let i = 0; i < 40; ++i) {
-      await page.keyboard.press("Tab");
-      if (
-        await page.evaluate(
-          (wanted) => document.activeElement.matches(wanted),
-          selector,
-        )
-      )
-        return;
+      await page.keyboard.press('Tab');
+      if (await page.evaluate((wanted) => document.activeElement.matches(wanted), selector)) return;
     }
     throw new Error(`the Tab key does not lead to ${selector}`);
   };
-  await tabTo(".menu summary");
-  await page.keyboard.press("Enter");
-  await page.getByText("Mesh, PLY").waitFor();
-  await page.keyboard.press("Escape");
-  await page.getByText("Mesh, PLY").waitFor({ state: "hidden" });
+  await tabTo('.menu summary');
+  await page.keyboard.press('Enter');
+  await page.getByText('Mesh, PLY').waitFor();
+  await page.keyboard.press('Escape');
+  await page.getByText('Mesh, PLY').waitFor({ state: 'hidden' });
 
-  await tabTo(".stage canvas");
-  const before = await page.locator(".stage canvas").screenshot();
-  for (const key of ["ArrowLeft", "ArrowLeft", "ArrowUp", "+"])
-    await page.keyboard.press(key);
+  await tabTo('.stage canvas');
+  const before = await page.locator('.stage canvas').screenshot();
+  for (const key of ['ArrowLeft', 'ArrowLeft', 'ArrowUp', '+']) await page.keyboard.press(key);
   await page.waitForTimeout(400);
-  assert.notDeepEqual(
-    await page.locator(".stage canvas").screenshot(),
-    before,
-    "the view has turned",
-  );
+  assert.notDeepEqual(await page.locator('.stage canvas').screenshot(), before, 'the view has turned');
 
-  await tabTo(".camera-list");
-  for (const key of ["ArrowDown", "ArrowDown", "ArrowDown", "Enter"])
-    await page.keyboard.press(key);
-  await page.getByRole("heading", { name: "DJI_0003.JPG" }).waitFor();
-  await page.locator(".photo img").waitFor();
-  await page.locator(".chips button").first().waitFor();
-  await keepScreenshot(page, "camera");
+  await tabTo('.camera-list');
+  for (const key of ['ArrowDown', 'ArrowDown', 'ArrowDown', 'Enter']) await page.keyboard.press(key);
+  await page.getByRole('heading', { name: 'DJI_0003.JPG' }).waitFor();
+  await page.locator('.photo img').waitFor();
+  await page.locator('.chips button').first().waitFor();
+  await keepScreenshot(page, 'camera');
   assert.deepEqual(await violations(page), []);
-  await page.keyboard.press("Enter"); // back, which has the focus
-  await page.locator(".camera-list").waitFor();
+  await page.keyboard.press('Enter'); // back, which has the focus
+  await page.locator('.camera-list').waitFor();
 });
 
-test("a running reconstruction can be cancelled, after a question", async (t) => {
-  const page = await openPage(
-    t,
-    browser,
-    `${base}#/reconstructions/second-flight`,
-  );
-  await page.getByRole("button", { name: "Cancel", exact: true }).click();
+test('a running reconstruction can be cancelled, after a question', async (t) => {
+  const page = await openPage(t, browser, `${base}#/reconstructions/second-flight`);
+  await page.getByRole('button', { name: 'Cancel', exact: true }).click();
   assert.deepEqual(await violations(page), []);
-  await page.getByRole("button", { name: "Keep it" }).click();
-  assert.equal(api.simulations.get("second-flight").state, "RUNNING");
-  await page.getByRole("button", { name: "Cancel", exact: true }).click();
-  await page.getByRole("button", { name: "Cancel it" }).click();
-  await page.locator(".badge", { hasText: "Cancelled" }).waitFor();
-  assert.equal(api.simulations.get("second-flight").state, "CANCELLED");
+  await page.getByRole('button', { name: 'Keep it' }).click();
+  assert.equal(api.simulations.get('second-flight').state, 'RUNNING');
+  await page.getByRole('button', { name: 'Cancel', exact: true }).click();
+  await page.getByRole('button', { name: 'Cancel it' }).click();
+  await page.locator('.badge', { hasText: 'Cancelled' }).waitFor();
+  assert.equal(api.simulations.get('second-flight').state, 'CANCELLED');
 });
 
-test("a worker can be drained", async (t) => {
+test('a worker can be drained', async (t) => {
   const page = await openPage(t, browser, `${base}#/workers`);
-  await page.getByRole("button", { name: "Drain worker-2" }).click();
-  await page.getByRole("button", { name: "Drain it" }).click();
-  await page
-    .locator(".worker", { hasText: "worker-2" })
-    .getByText("Drained")
-    .waitFor();
+  await page.getByRole('button', { name: 'Drain worker-2' }).click();
+  await page.getByRole('button', { name: 'Drain it' }).click();
+  await page.locator('.worker', { hasText: 'worker-2' }).getByText('Drained').waitFor();
   assert.ok(api.workers[1].draining);
 });
 
 function makeFolder(t, files) {
-  const folder = mkdtempSync(join(tmpdir(), "meshwright-dashboard-"));
+  const folder = mkdtempSync(join(tmpdir(), 'meshwright-dashboard-'));
   t.after(() => rmSync(folder, { recursive: true }));
   for (const [path, bytes] of Object.entries(files)) {
-    mkdirSync(join(folder, "My Castle", path, ".."), { recursive: true });
-    writeFileSync(join(folder, "My Castle", path), bytes);
+    mkdirSync(join(folder, 'My Castle', path, '..'), { recursive: true });
+    writeFileSync(join(folder, 'My Castle', path), bytes);
   }
-  return join(folder, "My Castle");
+  return join(folder, 'My Castle');
 }
 
-test("a folder is uploaded in parts, through interruptions, and its reconstruction opens", async (t) => {
-  const large = Buffer.alloc((20 << 20) + 17, "photograph");
+test('a folder is uploaded in parts, through interruptions, and its reconstruction opens', async (t) => {
+  const large = Buffer.alloc((20 << 20) + 17, 'photograph');
   const folder = makeFolder(t, {
-    "cameras.txt": "# cameras",
-    "images/a.jpg": large,
-    "images/b.jpg": "b",
-    ".DS_Store": "x",
+    'cameras.txt': '# cameras',
+    'images/a.jpg': large,
+    'images/b.jpg': 'b',
+    '.DS_Store': 'x',
   });
   const page = await openPage(t, browser, `${base}#/submit`);
-  await page.locator("#folder-input").setInputFiles(folder);
-  await page.getByText("COLMAP scene").waitFor();
-  assert.equal(
-    await page.getByLabel("Name", { exact: true }).inputValue(),
-    "my-castle",
-  );
-  await page.getByLabel("window").fill("2");
+  await page.locator('#folder-input').setInputFiles(folder);
+  await page.getByText('COLMAP scene').waitFor();
+  assert.equal(await page.getByLabel('Name', { exact: true }).inputValue(), 'my-castle');
+  await page.getByLabel('window').fill('2');
   api.failNext = 2;
-  await page.getByRole("button", { name: "Submit", exact: true }).click();
-  await page.getByText("trying again in").waitFor();
-  await page
-    .getByRole("heading", { name: "my-castle" })
-    .waitFor({ timeout: 30_000 });
-  const files = api.uploads.get("my-castle");
-  assert.deepEqual([...files.keys()].sort(), [
-    "cameras.txt",
-    "images/a.jpg",
-    "images/b.jpg",
-  ]);
-  assert.ok(files.get("images/a.jpg").bytes.equals(large));
-  assert.deepEqual(api.optionsOf.get("my-castle"), { window: 2 });
+  await page.getByRole('button', { name: 'Submit', exact: true }).click();
+  await page.getByText('trying again in').waitFor();
+  await page.getByRole('heading', { name: 'my-castle' }).waitFor({ timeout: 30_000 });
+  const files = api.uploads.get('my-castle');
+  assert.deepEqual([...files.keys()].sort(), ['cameras.txt', 'images/a.jpg', 'images/b.jpg']);
+  assert.ok(files.get('images/a.jpg').bytes.equals(large));
+  assert.deepEqual(api.optionsOf.get('my-castle'), { window: 2 });
   await until(async () => (await meshNumbers(page)).parts > 3);
 });

@@ -8,6 +8,7 @@ export interface CameraTable {
   sequences: Int32Array; // 0: not chosen yet
   acceptedPatches: Float64Array;
   attempts: Uint16Array;
+  workers: string[]; // who has it now, or had it last; '' when nobody had
   // coveredBefore, grown, filtered, accepted per camera, 0..1; NaN where there is none yet.
   shares: Float32Array;
   seconds: Float32Array; // of all stages; NaN where not processed
@@ -35,6 +36,7 @@ export function makeCameraTable(cameras: readonly Camera[]): CameraTable {
     sequences: new Int32Array(count),
     acceptedPatches: new Float64Array(count),
     attempts: new Uint16Array(count),
+    workers: cameras.map((camera) => camera.worker ?? ''),
     shares: new Float32Array(SHARES * count).fill(NaN),
     seconds: new Float32Array(count).fill(NaN),
     poses: new Float32Array(POSE * count),

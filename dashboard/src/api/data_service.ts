@@ -1,13 +1,14 @@
 import type { PartGeometry } from '../view3d/preview_decoder';
 import type { CameraTable } from './camera_table';
 import { ApiError } from './client';
-import type { Attempt, Camera } from './types';
+import type { Attempt, Camera, HeldCamera } from './types';
 
 interface Answers {
   cameras: CameraTable;
   camera: Camera | null;
   incidence: Int32Array; // reference, target, reference, target ...
   attempts: Attempt[];
+  held: HeldCamera[];
   preview: PartGeometry;
 }
 
@@ -15,7 +16,9 @@ type Question =
   | { kind: 'cameras'; url: string }
   | { kind: 'camera'; index: number } // of the cameras that were asked for last
   | { kind: 'incidence'; url: string }
-  | { kind: 'attempts'; url: string; running?: boolean } // only those that run
+  // These two: the address of the reconstruction.
+  | { kind: 'attempts'; url: string }
+  | { kind: 'held'; url: string }
   | { kind: 'preview'; url: string };
 
 export type DataRequest = { id: number } & Question;

@@ -1,7 +1,7 @@
 // Fetches what is large and turns it into columns and buffers, so that the page's own thread never parses it.
 import { decodePreview } from '../view3d/preview_decoder';
 import { makeCameraTable } from './camera_table';
-import type { Attempt, Camera } from './types';
+import type { Attempt, Camera, HeldCamera } from './types';
 import type { DataRequest, DataResponse } from './data_service';
 
 const post = self.postMessage.bind(self) as (message: DataResponse, transfer: Transferable[]) => void;
@@ -15,6 +15,25 @@ async function get(url: string, signal: AbortSignal): Promise<Response> {
 
 // The cameras as they were said last, for whoever asks for all of one.
 let lastCameras: Camera[] = [];
+
+async function attemptsAt(url: string, signal: AbortSignal): Promise<Attempt[]> {
+  const json = (await (await get(`${url}/attempts`, signal)).json()) as { attempts?: Attempt[] };
+  return json.attempts ?? [];
+}
+
+// What workers have now. Where attempts are not recorded the cameras say it too, but not since when.
+async function heldNow(url: string, signal: AbortSignal): Promise<HeldCamera[]> {
+  try {
+    const attempts = await attemptsAt(url, signal);
+    return attempts.filter((attempt) => attempt.outcome === 'ATTEMPT_OUTCOME_RUNNING');
+  } catch (error) {
+    if ((error as { status?: number }).status !== 501) throw error;
+  }
+  const json = (await (await get(`${url}/cameras`, signal)).json()) as { cameras?: Camera[] };
+  return (json.cameras ?? [])
+    .filter(({ state, worker }) => state === 'CAMERA_STATE_ASSIGNED' && worker)
+    .map(({ index, sequence, worker }) => ({ camera: index, sequence, worker: worker! }));
+}
 
 async function answer(request: DataRequest, signal: AbortSignal): Promise<[unknown, Transferable[]]> {
   switch (request.kind) {
@@ -34,11 +53,10 @@ async function answer(request: DataRequest, signal: AbortSignal): Promise<[unkno
       pairs.forEach(({ reference = 0, target = 0 }, i) => columns.set([reference, target], 2 * i));
       return [columns, [columns.buffer]];
     }
-    case 'attempts': {
-      const json = (await (await get(request.url, signal)).json()) as { attempts?: Attempt[] };
-      const attempts = json.attempts ?? [];
-      return [request.running ? attempts.filter((a) => a.outcome === 'ATTEMPT_OUTCOME_RUNNING') : attempts, []];
-    }
+    case 'attempts':
+      return [await attemptsAt(request.url, signal), []];
+    case 'held':
+      return [await heldNow(request.url, signal), []];
     case 'preview': {
       const part = decodePreview(await (await get(request.url, signal)).arrayBuffer());
       return [part, [part.positions.buffer, part.normals.buffer, part.colors.buffer, part.indices.buffer]];

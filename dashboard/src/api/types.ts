@@ -78,6 +78,14 @@ export interface Attempt {
   reason?: string;
 }
 
+// A camera that a worker has at this moment.
+export interface HeldCamera {
+  camera: number;
+  sequence: number;
+  worker: string;
+  startTime?: string; // where attempts are recorded
+}
+
 export interface LogEntry {
   time: string;
   severity: 'info' | 'warning' | 'error';

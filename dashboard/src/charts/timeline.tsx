@@ -84,6 +84,7 @@ export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; 
     context.textBaseline = 'middle';
     context.fillStyle = cssColor('--text-2');
     context.strokeStyle = cssColor('--line');
+    if (bars.length === 0) return;
     for (const at of ticks(begin, end, Math.max(2, (width - labels) / 90))) {
       context.beginPath();
       context.moveTo(x(at) + 0.5, 0);
@@ -128,7 +129,9 @@ export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; 
   const troubles = bars.filter((bar) => bar.outcome === 'FAILED' || bar.outcome === 'LOST');
   const words =
     bars.length === 0
-      ? 'no camera has been handed out yet'
+      ? store.attemptsMissing.value
+        ? 'this coordinator keeps no record of them'
+        : 'no camera has been handed out yet'
       : `${bars.length} attempts on ${workers.length} workers, ` +
         (troubles.length === 0 ? 'none failed or lost' : `${troubles.length} failed or lost`);
 

@@ -1,25 +1,17 @@
-// Cameras are committed in one order: the earliest camera in flight is the one that everything waits for.
+// Who holds up the others.
 import { useEffect, useState } from 'preact/hooks';
 import { reconstructionUrl } from '../api/client';
 import { DataService } from '../api/data_service';
-import type { Attempt } from '../api/types';
+import type { HeldCamera } from '../api/types';
 import { duration } from '../format';
+import { firstInOrder } from '../state/order';
 
-export function firstInOrder(attempts: readonly Attempt[]): Attempt | null {
-  let first: Attempt | null = null;
-  for (const attempt of attempts) {
-    if (attempt.outcome !== 'ATTEMPT_OUTCOME_RUNNING') continue;
-    if (first === null || attempt.sequence < first.sequence) first = attempt;
-  }
-  return first;
-}
-
-export function SlowestStepWords({ attempt, name, now }: { attempt: Attempt; name?: string; now: number }) {
-  const seconds = Math.max(0, (now - Date.parse(attempt.startTime)) / 1000);
+export function SlowestStepWords({ held, name, now }: { held: HeldCamera; name?: string; now: number }) {
+  const seconds = held.startTime === undefined ? null : Math.max(0, (now - Date.parse(held.startTime)) / 1000);
   return (
     <span>
-      Next commit waits for <strong>{name ?? `camera ${attempt.camera}`}</strong> at <strong>{attempt.worker}</strong>,{' '}
-      {duration(seconds)} so far
+      Next commit waits for <strong>{name ?? `camera ${held.camera}`}</strong> at <strong>{held.worker}</strong>
+      {seconds !== null && `, ${duration(seconds)} so far`}
     </span>
   );
 }
@@ -28,14 +20,13 @@ export function SlowestStepWords({ attempt, name, now }: { attempt: Attempt; nam
 let shared: DataService | null = null;
 
 export function SlowestStep({ id, now }: { id: string; now: number }) {
-  const [attempt, setAttempt] = useState<Attempt | null>(null);
+  const [held, setHeld] = useState<HeldCamera | null>(null);
   useEffect(() => {
     let closed = false;
     const refresh = async () => {
       shared ??= new DataService();
-      const url = reconstructionUrl(id, '/attempts');
-      const running = await shared.ask({ kind: 'attempts', url, running: true }).catch(() => []);
-      if (!closed) setAttempt(firstInOrder(running));
+      const all = await shared.ask({ kind: 'held', url: reconstructionUrl(id) }).catch(() => []);
+      if (!closed) setHeld(firstInOrder(all));
     };
     void refresh();
     const timer = setInterval(() => void refresh(), 4000);
@@ -44,5 +35,5 @@ export function SlowestStep({ id, now }: { id: string; now: number }) {
       clearInterval(timer);
     };
   }, [id]);
-  return attempt === null ? null : <SlowestStepWords attempt={attempt} now={now} />;
+  return held === null ? null : <SlowestStepWords held={held} now={now} />;
 }

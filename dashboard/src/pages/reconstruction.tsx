@@ -9,7 +9,7 @@ import { Downloads } from '../components/downloads';
 import { useNow } from '../components/hooks';
 import { LogCard } from '../components/log';
 import { Confirm, Notice, PageTitle, ProgressBar, StateBadge } from '../components/pieces';
-import { firstInOrder, SlowestStepWords } from '../components/slowest_step';
+import { SlowestStepWords } from '../components/slowest_step';
 import { ViewerPanel } from '../components/viewer_panel';
 import { count, duration, percent } from '../format';
 import { linkTo } from '../router';
@@ -35,7 +35,7 @@ function Summary({ store, reconstruction }: { store: ReconstructionStore; recons
   const end = isOver(state) ? Date.parse(reconstruction.finishTime ?? '') || now : now;
   const left = state === 'RUNNING' ? secondsLeft(store.samples.value, total, start, now) : null;
   const filtered = Number(progress.patchesFiltered ?? 0);
-  const first = state === 'RUNNING' ? firstInOrder(store.attempts.value) : null;
+  const first = state === 'RUNNING' ? store.firstHeld() : null;
   const name = first === null ? undefined : store.cameras.value?.names[first.camera];
   return (
     <section class="card summary" aria-label="Progress">
@@ -59,7 +59,7 @@ function Summary({ store, reconstruction }: { store: ReconstructionStore; recons
       </dl>
       {first !== null && (
         <p class="muted small">
-          <SlowestStepWords attempt={first} name={name} now={now} />
+          <SlowestStepWords held={first} name={name} now={now} />
         </p>
       )}
     </section>

@@ -1,13 +1,13 @@
 import { useEffect, useState } from 'preact/hooks';
 import { api, reconstructionUrl } from '../api/client';
 import { DataService } from '../api/data_service';
-import { stateOf, type Attempt, type Worker } from '../api/types';
+import { stateOf, type HeldCamera, type Worker } from '../api/types';
 import { useNow, usePolled } from '../components/hooks';
 import { Confirm, Notice, PageTitle } from '../components/pieces';
 import { ago, bytes, count, duration } from '../format';
 import { linkTo } from '../router';
 
-type Held = Attempt & { reconstruction: string };
+type Held = HeldCamera & { reconstruction: string };
 
 const POLL_MS = 2500;
 // Longer silence than any heartbeat explains.
@@ -17,9 +17,8 @@ async function heldByWorker(data: DataService): Promise<Map<string, Held[]>> {
   const held = new Map<string, Held[]>();
   const running = (await api.listReconstructions()).filter((one) => stateOf(one) === 'RUNNING');
   for (const { id } of running) {
-    const url = reconstructionUrl(id, '/attempts');
-    for (const attempt of await data.ask({ kind: 'attempts', url, running: true })) {
-      held.set(attempt.worker, [...(held.get(attempt.worker) ?? []), { ...attempt, reconstruction: id }]);
+    for (const one of await data.ask({ kind: 'held', url: reconstructionUrl(id) })) {
+      held.set(one.worker, [...(held.get(one.worker) ?? []), { ...one, reconstruction: id }]);
     }
   }
   return held;
@@ -67,13 +66,14 @@ function WorkerCard(props: { worker: Worker; held: Held[]; now: number; onDrain:
       </dl>
       {held.length > 0 && (
         <ul class="held small" aria-label={`What ${worker.id} does now`}>
-          {held.map((attempt) => (
-            <li key={`${attempt.reconstruction}/${attempt.sequence}`}>
+          {held.map((one) => (
+            <li key={`${one.reconstruction}/${one.sequence}`}>
               <span>
-                camera {attempt.camera} of{' '}
-                <a href={linkTo.reconstruction(attempt.reconstruction)}>{attempt.reconstruction}</a>
+                camera {one.camera} of <a href={linkTo.reconstruction(one.reconstruction)}>{one.reconstruction}</a>
               </span>
-              <span class="muted">{duration(Math.max(0, (now - Date.parse(attempt.startTime)) / 1000))}</span>
+              {one.startTime !== undefined && (
+                <span class="muted">{duration(Math.max(0, (now - Date.parse(one.startTime)) / 1000))}</span>
+              )}
             </li>
           ))}
         </ul>

@@ -158,7 +158,7 @@ export class SceneViewer {
     if (direction.length() < 0.15 * radius) direction.copy(this.up).addScaledVector(anyNormalTo(this.up), 1.2);
     direction.normalize().addScaledVector(this.up, 0.35).normalize();
     const narrow = Math.min(1, this.view.aspect);
-    const distance = (0.9 * radius) / (Math.tan((this.view.fov * Math.PI) / 360) * narrow);
+    const distance = (0.75 * radius) / (Math.tan((this.view.fov * Math.PI) / 360) * narrow);
     this.view.position.copy(center).addScaledVector(direction, distance);
     this.controls.target.copy(center);
     this.controls.update();

@@ -1,62 +1,42 @@
 // The coordinator's REST API (coordinator/rest/openapi.yaml) over simulated reconstructions, and the page beside it.
 //   node server.js [--port 7421] [--cameras 5000] [--faces 4000] [--committed 3000] [--rate 20] [--page DIST]
-import { createHash } from "node:crypto";
-import { createReadStream, existsSync, statSync } from "node:fs";
-import { createServer } from "node:http";
-import { extname, join, normalize } from "node:path";
-import { fileURLToPath } from "node:url";
-import { parseArgs } from "node:util";
-import { Simulation } from "./simulation.js";
+import { createHash } from 'node:crypto';
+import { createReadStream, existsSync, statSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { extname, join, normalize } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { parseArgs } from 'node:util';
+import { Simulation } from './simulation.js';
 
 const TYPES = {
-  ".html": "text/html",
-  ".js": "text/javascript",
-  ".css": "text/css",
-  ".svg": "image/svg+xml",
+  '.html': 'text/html',
+  '.js': 'text/javascript',
+  '.css': 'text/css',
+  '.svg': 'image/svg+xml',
 };
 const OPTIONS = [
+  ['Method', 'max-image-size', 'integer', 0, { minimum: 0 }, 'longest side of the images used, px; 0: as they are'],
   [
-    "Method",
-    "max-image-size",
-    "integer",
-    0,
-    { minimum: 0 },
-    "longest side of the images used, px; 0: as they are",
-  ],
-  [
-    "Method",
-    "lattice-step",
-    "integer",
+    'Method',
+    'lattice-step',
+    'integer',
     2,
     { minimum: 1, maximum: 16 },
     "gamma: spacing of the reference camera's rays, px",
   ],
+  ['Method', 'window', 'integer', 4, { minimum: 1 }, 'W: cameras chosen and not yet committed at the same time'],
   [
-    "Method",
-    "window",
-    "integer",
-    4,
-    { minimum: 1 },
-    "W: cameras chosen and not yet committed at the same time",
-  ],
-  [
-    "Seeds (3.5)",
-    "min-seed-quality",
-    "number",
+    'Seeds (3.5)',
+    'min-seed-quality',
+    'number',
     0.6,
     { minimum: -1, maximum: 1 },
-    "photo-consistency that a seed must reach",
+    'photo-consistency that a seed must reach',
   ],
 ];
 
 export class FakeApi {
-  constructor({
-    page,
-    cameras = 5000,
-    faces = 4000,
-    committed = 3000,
-    rate = 20,
-  }) {
+  constructor({ page, cameras = 5000, faces = 4000, committed = 3000, rate = 20 }) {
     this.page = page;
     this.workers = Array.from({ length: 8 }, (_, i) => ({
       id: `worker-${i + 1}`,
@@ -64,7 +44,7 @@ export class FakeApi {
       memoryBytes: String(16 * 2 ** 30),
       draining: false,
       jobs: i < 7 ? 3 : 0,
-      version: "0.1.0",
+      version: '0.1.0',
     }));
     const workers = this.workers.slice(0, 7).map((worker) => worker.id);
     const make = (more) =>
@@ -77,25 +57,24 @@ export class FakeApi {
     this.simulations = new Map(
       [
         make({
-          id: "campaign",
+          id: 'campaign',
           cameras,
           startCommitted: committed,
           commitsPerSecond: rate,
         }),
         make({
-          id: "second-flight",
+          id: 'second-flight',
           cameras: 240,
           startCommitted: 60,
           commitsPerSecond: rate / 10,
         }),
-        make({ id: "done", cameras: 60, startCommitted: 60, state: "DONE" }),
+        make({ id: 'done', cameras: 60, startCommitted: 60, state: 'DONE' }),
         make({
-          id: "broken",
+          id: 'broken',
           cameras: 12,
           startCommitted: 2,
-          state: "FAILED",
-          failure:
-            "images/DJI_0007.JPG: 4000 x 2250 px, but its camera has 4000 x 3000",
+          state: 'FAILED',
+          failure: 'images/DJI_0007.JPG: 4000 x 2250 px, but its camera has 4000 x 3000',
         }),
       ].map((simulation) => [simulation.id, simulation]),
     );
@@ -115,13 +94,8 @@ export class FakeApi {
         else response.destroy();
       });
     });
-    await new Promise((resolve) =>
-      this.server.listen(port, "127.0.0.1", resolve),
-    );
-    this.timer = setInterval(
-      () => this.simulations.forEach((simulation) => simulation.tick(0.25)),
-      250,
-    );
+    await new Promise((resolve) => this.server.listen(port, '127.0.0.1', resolve));
+    this.timer = setInterval(() => this.simulations.forEach((simulation) => simulation.tick(0.25)), 250);
     return this.server.address().port;
   }
 
@@ -137,66 +111,45 @@ export class FakeApi {
   }
 
   async handle(request, response) {
-    const url = new URL(request.url, "http://localhost");
+    const url = new URL(request.url, 'http://localhost');
     const path = url.pathname;
-    if (!path.startsWith("/v1/")) return this.file(path, response);
-    const route = path.slice(4).split("/").map(decodeURIComponent);
-    if (path === "/v1/options")
-      return json(response, { options: OPTIONS.map(toOption) });
-    if (path === "/v1/workers") {
+    if (!path.startsWith('/v1/')) return this.file(path, response);
+    const route = path.slice(4).split('/').map(decodeURIComponent);
+    if (path === '/v1/options') return json(response, { options: OPTIONS.map(toOption) });
+    if (path === '/v1/workers') {
       const lastSeen = new Date(Date.now() - 1200).toISOString();
       return json(response, {
         workers: this.workers.map((worker) => ({ ...worker, lastSeen })),
       });
     }
-    if (route[0] === "workers" && route[1].endsWith(":drain")) {
+    if (route[0] === 'workers' && route[1].endsWith(':drain')) {
       const worker = this.workers.find(({ id }) => `${id}:drain` === route[1]);
-      if (worker === undefined)
-        return problem(response, 404, "worker: no such worker");
+      if (worker === undefined) return problem(response, 404, 'worker: no such worker');
       worker.draining = true;
       return response.writeHead(204).end();
     }
-    if (path === "/v1/reconstructions") return this.all(request, response);
-    const [id, action] = route[1].split(":");
-    if (this.created.has(id))
-      return this.beingMade(
-        request,
-        response,
-        url,
-        id,
-        action ?? "",
-        route.slice(2),
-      );
+    if (path === '/v1/reconstructions') return this.all(request, response);
+    const [id, action] = route[1].split(':');
+    if (this.created.has(id)) return this.beingMade(request, response, url, id, action ?? '', route.slice(2));
     const simulation = this.simulations.get(id);
-    if (simulation === undefined)
-      return problem(response, 404, `id: "${id}": no such reconstruction`);
-    return this.one(
-      response,
-      request,
-      url,
-      simulation,
-      action ?? "",
-      route.slice(2),
-    );
+    if (simulation === undefined) return problem(response, 404, `id: "${id}": no such reconstruction`);
+    return this.one(response, request, url, simulation, action ?? '', route.slice(2));
   }
 
   async all(request, response) {
-    if (request.method === "GET") {
+    if (request.method === 'GET') {
       const made = [...this.created.values()];
-      const reconstructions = [...this.simulations.values()].map((simulation) =>
-        simulation.reconstruction(),
-      );
+      const reconstructions = [...this.simulations.values()].map((simulation) => simulation.reconstruction());
       return json(response, {
         reconstructions: [...reconstructions, ...made],
-        nextPageToken: "",
+        nextPageToken: '',
       });
     }
     const body = JSON.parse(String(await bodyOf(request)));
-    if (!/^[a-z0-9][a-z0-9-]{0,63}$/.test(body.id))
-      return problem(response, 400, `id: "${body.id}"`, "id");
+    if (!/^[a-z0-9][a-z0-9-]{0,63}$/.test(body.id)) return problem(response, 400, `id: "${body.id}"`, 'id');
     const made = {
       ...body,
-      state: "RECONSTRUCTION_STATE_CREATED",
+      state: 'RECONSTRUCTION_STATE_CREATED',
       createTime: new Date().toISOString(),
     };
     if (!this.created.has(body.id)) this.created.set(body.id, made);
@@ -214,7 +167,7 @@ export class FakeApi {
       offsetBytes: String(file.bytes.length),
       complete: file.bytes.length === file.size,
     });
-    if (action === "start") {
+    if (action === 'start') {
       this.created.delete(id);
       const workers = this.workers.slice(0, 2).map((worker) => worker.id);
       const simulation = new Simulation({
@@ -228,15 +181,14 @@ export class FakeApi {
       this.simulations.set(id, simulation);
       return json(response, simulation.reconstruction());
     }
-    if (rest[0] !== "files") return json(response, this.created.get(id));
-    if (request.method === "GET")
-      return json(response, { files: [...files].map(asJson) });
+    if (rest[0] !== 'files') return json(response, this.created.get(id));
+    if (request.method === 'GET') return json(response, { files: [...files].map(asJson) });
     const part = await bodyOf(request);
     if (this.failNext > 0) {
       this.failNext -= 1;
-      return problem(response, 503, "the store cannot be reached");
+      return problem(response, 503, 'the store cannot be reached');
     }
-    const path = rest.slice(1).join("/");
+    const path = rest.slice(1).join('/');
     const query = Object.fromEntries(url.searchParams);
     let file = files.get(path);
     if (file?.sha256 !== query.sha256)
@@ -245,76 +197,65 @@ export class FakeApi {
         sha256: query.sha256,
         bytes: Buffer.alloc(0),
       };
-    if (createHash("sha256").update(part).digest("hex") !== query.partSha256)
-      return problem(response, 422, "partSha256");
+    if (createHash('sha256').update(part).digest('hex') !== query.partSha256)
+      return problem(response, 422, 'partSha256');
     const offset = Number(query.offset);
-    if (offset > file.bytes.length)
-      return problem(response, 409, `offset: ${offset}`, "offset");
-    if (offset + part.length > file.bytes.length)
-      file.bytes = Buffer.concat([file.bytes.subarray(0, offset), part]);
+    if (offset > file.bytes.length) return problem(response, 409, `offset: ${offset}`, 'offset');
+    if (offset + part.length > file.bytes.length) file.bytes = Buffer.concat([file.bytes.subarray(0, offset), part]);
     files.set(path, file);
     return json(response, asJson([path, file]));
   }
 
   one(response, request, url, simulation, action, rest) {
-    if (action === "cancel") {
-      if (simulation.state === "RUNNING") simulation.finish("CANCELLED");
+    if (action === 'cancel') {
+      if (simulation.state === 'RUNNING') simulation.finish('CANCELLED');
       return json(response, simulation.reconstruction());
     }
-    switch (rest[0] ?? "") {
-      case "":
+    switch (rest[0] ?? '') {
+      case '':
         return json(response, simulation.reconstruction());
-      case "events":
+      case 'events':
         return this.events(request, response, simulation);
-      case "cameras":
-        return rest[2] === "photo"
+      case 'cameras':
+        return rest[2] === 'photo'
           ? photo(response, simulation, Number(rest[1]))
           : json(response, simulation.camerasJson());
-      case "incidence":
+      case 'incidence':
         return json(response, simulation.incidenceJson());
-      case "attempts":
+      case 'attempts':
         return json(response, { attempts: simulation.attempts });
-      case "log":
+      case 'log':
         return json(response, { entries: simulation.log });
-      case "parts": {
+      case 'parts': {
         if (rest.length < 2) return json(response, { parts: simulation.parts });
-        const preview = simulation.preview(
-          Number(rest[1]),
-          Number(url.searchParams.get("max_faces") ?? 20000),
-        );
-        if (preview === null)
-          return problem(response, 404, "sequence: no such part");
-        return response
-          .writeHead(200, { "Content-Type": "application/octet-stream" })
-          .end(preview);
+        const preview = simulation.preview(Number(rest[1]), Number(url.searchParams.get('max_faces') ?? 20000));
+        if (preview === null) return problem(response, 404, 'sequence: no such part');
+        return response.writeHead(200, { 'Content-Type': 'application/octet-stream' }).end(preview);
       }
       default:
-        return problem(response, 404, "no such thing in the simulation");
+        return problem(response, 404, 'no such thing in the simulation');
     }
   }
 
   events(request, response, simulation) {
     response.writeHead(200, {
-      "Content-Type": "text/event-stream",
-      "Cache-Control": "no-store",
+      'Content-Type': 'text/event-stream',
+      'Cache-Control': 'no-store',
     });
     this.streams.add(response);
-    let sequence = Number(request.headers["last-event-id"] ?? 0);
+    let sequence = Number(request.headers['last-event-id'] ?? 0);
     const send = (event, data) => {
-      if (event === "part") sequence = data.sequence;
-      response.write(
-        `id: ${sequence}\nevent: ${event}\ndata: ${JSON.stringify(data)}\n\n`,
-      );
-      if (event === "end") response.end();
+      if (event === 'part') sequence = data.sequence;
+      response.write(`id: ${sequence}\nevent: ${event}\ndata: ${JSON.stringify(data)}\n\n`);
+      if (event === 'end') response.end();
     };
-    response.write("retry: 500\n\n");
-    send("reconstruction", simulation.reconstruction());
-    for (const part of simulation.parts)
-      if (part.sequence > sequence) send("part", part);
-    if (simulation.state !== "RUNNING") return send("end", {});
+    response.write('retry: 500\n\n');
+    send('reconstruction', simulation.reconstruction());
+    for (const part of simulation.parts) if (part.sequence > sequence) send('part', part);
+    if (simulation.state !== 'RUNNING') return send('end', {});
     simulation.listeners.add(send);
-    const beat = setInterval(() => response.write(": heartbeat\n\n"), 15_000);
-    response.on("close", () => {
+    const beat = setInterval(() => response.write(': heartbeat\n\n'), 15_000);
+    response.on('close', () => {
       clearInterval(beat);
       simulation.listeners.delete(send);
       this.streams.delete(response);
@@ -322,19 +263,12 @@ export class FakeApi {
   }
 
   file(path, response) {
-    const name = join(
-      this.page,
-      normalize(path === "/" ? "/index.html" : path),
-    );
-    if (
-      !name.startsWith(this.page) ||
-      !existsSync(name) ||
-      !statSync(name).isFile()
-    ) {
-      return problem(response, 404, "no such file");
+    const name = join(this.page, normalize(path === '/' ? '/index.html' : path));
+    if (!name.startsWith(this.page) || !existsSync(name) || !statSync(name).isFile()) {
+      return problem(response, 404, 'no such file');
     }
     response.writeHead(200, {
-      "Content-Type": TYPES[extname(name)] ?? "application/octet-stream",
+      'Content-Type': TYPES[extname(name)] ?? 'application/octet-stream',
     });
     createReadStream(name).pipe(response);
   }
@@ -351,19 +285,19 @@ async function bodyOf(request) {
 }
 
 function json(response, value) {
-  response.writeHead(200, { "Content-Type": "application/json" });
+  response.writeHead(200, { 'Content-Type': 'application/json' });
   response.end(JSON.stringify(value));
 }
 
 function problem(response, status, detail, field) {
-  response.writeHead(status, { "Content-Type": "application/problem+json" });
+  response.writeHead(status, { 'Content-Type': 'application/problem+json' });
   response.end(
     JSON.stringify({
-      type: "about:blank",
+      type: 'about:blank',
       title: String(status),
       status,
       detail,
-      code: "",
+      code: '',
       field,
     }),
   );
@@ -371,29 +305,24 @@ function problem(response, status, detail, field) {
 
 function photo(response, simulation, camera) {
   const hue = (camera * 37) % 360;
-  response.writeHead(200, { "Content-Type": "image/svg+xml" });
+  response.writeHead(200, { 'Content-Type': 'image/svg+xml' });
   response.end(`<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 300"><rect width="400" height="300"
     fill="hsl(${hue} 25% 45%)"/><path d="M0 220 90 120l70 70 90-110 150 130v90H0z" fill="hsl(${hue} 30% 30%)"/>
-    <text x="14" y="286" font-family="sans-serif" font-size="20" fill="#fff">${simulation.cameras[camera]?.name ?? ""}</text></svg>`);
+    <text x="14" y="286" font-family="sans-serif" font-size="20" fill="#fff">${simulation.cameras[camera]?.name ?? ''}</text></svg>`);
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
   const { values } = parseArgs({
     options: Object.fromEntries(
-      ["port", "cameras", "faces", "committed", "rate", "page"].map((name) => [
-        name,
-        { type: "string" },
-      ]),
+      ['port', 'cameras', 'faces', 'committed', 'rate', 'page'].map((name) => [name, { type: 'string' }]),
     ),
   });
   const numbers = Object.fromEntries(
     Object.entries(values)
-      .filter(([name]) => name !== "page")
+      .filter(([name]) => name !== 'page')
       .map(([name, value]) => [name, Number(value)]),
   );
-  const page =
-    values.page ??
-    fileURLToPath(new URL("../../../dashboard/dist", import.meta.url));
+  const page = values.page ?? fileURLToPath(new URL('../../../dashboard/dist', import.meta.url));
   const api = new FakeApi({ ...numbers, page });
   const port = await api.listen(numbers.port ?? 7421);
   console.log(`http://127.0.0.1:${port}/`);

@@ -1,7 +1,7 @@
 // A reconstruction that goes on by itself: cameras over a terrain are assigned to workers, fail now and then, and are
 // committed in order.
-import { createHash } from "node:crypto";
-import { makePreview } from "./preview.js";
+import { createHash } from 'node:crypto';
+import { makePreview } from './preview.js';
 
 const CELL = 4; // world units between cameras
 const ALTITUDE = 22;
@@ -9,9 +9,7 @@ const WINDOW = 24;
 
 // Numbers in [0, 1) that depend on their arguments alone.
 function draw(...keys) {
-  return (
-    createHash("md5").update(keys.join("/")).digest().readUInt32LE(0) / 2 ** 32
-  );
+  return createHash('md5').update(keys.join('/')).digest().readUInt32LE(0) / 2 ** 32;
 }
 
 export class Simulation {
@@ -23,41 +21,32 @@ export class Simulation {
     workers,
     commitsPerSecond,
     startCommitted,
-    state = "RUNNING",
-    failure = "",
+    state = 'RUNNING',
+    failure = '',
   }) {
     Object.assign(this, { id, failure, state, commitsPerSecond });
     this.workers = workers;
     this.columns = Math.ceil(Math.sqrt(cameras * 1.6));
     this.rows = Math.round(Math.sqrt(facesPerPart / 2)) + 1;
-    this.createTime =
-      Date.now() -
-      (startCommitted / Math.max(commitsPerSecond, 1)) * 1000 -
-      2000;
+    this.createTime = Date.now() - (startCommitted / Math.max(commitsPerSecond, 1)) * 1000 - 2000;
     this.finishTime = null;
     this.listeners = new Set();
     this.attempts = [];
     this.log = [];
     this.parts = [];
-    this.cameras = Array.from({ length: cameras }, (_, index) =>
-      this.makeCamera(index),
-    );
+    this.cameras = Array.from({ length: cameras }, (_, index) => this.makeCamera(index));
     this.order = this.cameras.map((camera) => camera.index);
-    this.say(this.createTime, "info", `The scene has ${cameras} cameras`);
+    this.say(this.createTime, 'info', `The scene has ${cameras} cameras`);
     this.chosen = 0;
     for (let i = 0; i < startCommitted; ++i) {
-      this.now =
-        this.createTime + 1000 + (i / Math.max(commitsPerSecond, 1)) * 1000;
+      this.now = this.createTime + 1000 + (i / Math.max(commitsPerSecond, 1)) * 1000;
       this.step();
     }
-    if (state !== "RUNNING") this.finish(state);
+    if (state !== 'RUNNING') this.finish(state);
   }
 
   makeCamera(index) {
-    const [column, row] = [
-      index % this.columns,
-      Math.floor(index / this.columns),
-    ];
+    const [column, row] = [index % this.columns, Math.floor(index / this.columns)];
     const [x, y] = [column * CELL, row * CELL];
     // Looks straight down, north up: X right, Y down in the photograph, Z towards the ground.
     const rotation = [1, 0, 0, 0, -1, 0, 0, 0, -1];
@@ -71,35 +60,25 @@ export class Simulation {
       rotation,
     };
     geometry.translation = [-x, y, ALTITUDE];
-    const name = `DJI_${String(index).padStart(4, "0")}.JPG`;
+    const name = `DJI_${String(index).padStart(4, '0')}.JPG`;
     return {
       index,
       name,
-      state: "CAMERA_STATE_WAITING",
+      state: 'CAMERA_STATE_WAITING',
       sequence: 0,
       attempts: 0,
-      worker: "",
+      worker: '',
       geometry,
     };
   }
 
   neighbours(index) {
-    const [column, row] = [
-      index % this.columns,
-      Math.floor(index / this.columns),
-    ];
+    const [column, row] = [index % this.columns, Math.floor(index / this.columns)];
     const found = [];
     for (let j = row - 2; j <= row + 2; ++j) {
       for (let i = column - 2; i <= column + 2; ++i) {
         const other = j * this.columns + i;
-        if (
-          i >= 0 &&
-          i < this.columns &&
-          j >= 0 &&
-          other < this.cameras.length &&
-          other !== index
-        )
-          found.push(other);
+        if (i >= 0 && i < this.columns && j >= 0 && other < this.cameras.length && other !== index) found.push(other);
       }
     }
     return found;
@@ -117,13 +96,10 @@ export class Simulation {
 
   // Fills the window, then ends and commits the first camera in flight.
   step() {
-    while (
-      this.chosen < this.order.length &&
-      this.chosen - this.parts.length - this.setAside() < WINDOW
-    ) {
+    while (this.chosen < this.order.length && this.chosen - this.parts.length - this.setAside() < WINDOW) {
       const camera = this.cameras[this.order[this.chosen]];
       camera.sequence = ++this.chosen;
-      camera.state = "CAMERA_STATE_ASSIGNED";
+      camera.state = 'CAMERA_STATE_ASSIGNED';
       this.begin(camera);
     }
     const next = this.parts.length + this.setAside();
@@ -147,7 +123,7 @@ export class Simulation {
       epoch: String(camera.attempts),
       worker,
       startTime: new Date(this.now).toISOString(),
-      outcome: "ATTEMPT_OUTCOME_RUNNING",
+      outcome: 'ATTEMPT_OUTCOME_RUNNING',
     };
     this.attempts.push(camera.attempt);
   }
@@ -164,40 +140,29 @@ export class Simulation {
     const luck = draw(this.id, camera.index);
     if (luck < 0.012) {
       const lost = luck < 0.006;
-      const reason = lost
-        ? "the lease ran out"
-        : "out of memory: 5120 MiB wanted, 4096 MiB allowed";
-      this.close(camera.attempt, lost ? "LOST" : "FAILED", reason);
-      this.say(
-        this.now,
-        "warning",
-        `${lost ? "Lease lost" : "Failed"}: ${reason}; tried again`,
-        {
-          camera: camera.index,
-          worker: camera.worker,
-        },
-      );
+      const reason = lost ? 'the lease ran out' : 'out of memory: 5120 MiB wanted, 4096 MiB allowed';
+      this.close(camera.attempt, lost ? 'LOST' : 'FAILED', reason);
+      this.say(this.now, 'warning', `${lost ? 'Lease lost' : 'Failed'}: ${reason}; tried again`, {
+        camera: camera.index,
+        worker: camera.worker,
+      });
       this.begin(camera);
     }
-    this.close(camera.attempt, "FINISHED");
-    if (draw(this.id, camera.index, "aside") < 0.001) {
-      camera.state = "CAMERA_STATE_SET_ASIDE";
-      camera.setAsideReason =
-        "failed three times: the photograph cannot be decoded";
+    this.close(camera.attempt, 'FINISHED');
+    if (draw(this.id, camera.index, 'aside') < 0.001) {
+      camera.state = 'CAMERA_STATE_SET_ASIDE';
+      camera.setAsideReason = 'failed three times: the photograph cannot be decoded';
       this.asideCount = this.setAside() + 1;
-      this.say(this.now, "error", `Set aside: ${camera.setAsideReason}`, {
+      this.say(this.now, 'error', `Set aside: ${camera.setAsideReason}`, {
         camera: camera.index,
       });
       return;
     }
     const age = camera.sequence / this.order.length;
-    const grown = Math.max(
-      0.05,
-      0.9 - 0.7 * age + 0.12 * (draw(camera.index, 1) - 0.5),
-    );
+    const grown = Math.max(0.05, 0.9 - 0.7 * age + 0.12 * (draw(camera.index, 1) - 0.5));
     const faces = 2 * (this.rows - 1) ** 2;
     Object.assign(camera, {
-      state: "CAMERA_STATE_COMMITTED",
+      state: 'CAMERA_STATE_COMMITTED',
       filteredPatches: String(Math.round(faces * 0.62)),
       acceptedPatches: String(Math.round(faces / 1.9)),
       shares: {
@@ -230,38 +195,32 @@ export class Simulation {
     const part = {
       sequence: camera.sequence,
       camera: camera.index,
-      sha256: createHash("sha256")
-        .update(`${this.id}/${camera.index}`)
-        .digest("hex"),
+      sha256: createHash('sha256').update(`${this.id}/${camera.index}`).digest('hex'),
       patches: camera.acceptedPatches,
     };
     this.parts.push(part);
-    this.emit("part", part);
+    this.emit('part', part);
   }
 
   finish(state) {
     this.state = state;
     this.finishTime = this.now ?? Date.now();
-    this.say(
-      this.finishTime,
-      "info",
-      `The reconstruction is ${state.toLowerCase()}`,
-    );
-    this.emit("reconstruction", this.reconstruction());
-    this.emit("end", {});
+    this.say(this.finishTime, 'info', `The reconstruction is ${state.toLowerCase()}`);
+    this.emit('reconstruction', this.reconstruction());
+    this.emit('end', {});
   }
 
   // Commits what is due by the clock.
   tick(seconds) {
-    if (this.state !== "RUNNING") return;
+    if (this.state !== 'RUNNING') return;
     this.due = (this.due ?? 0) + this.commitsPerSecond * seconds;
     this.now = Date.now();
     let moved = false;
     for (; this.due >= 1; --this.due) {
-      if (!this.step()) return this.finish("DONE");
+      if (!this.step()) return this.finish('DONE');
       moved = true;
     }
-    if (moved) this.emit("reconstruction", this.reconstruction());
+    if (moved) this.emit('reconstruction', this.reconstruction());
   }
 
   emit(event, data) {
@@ -269,39 +228,31 @@ export class Simulation {
   }
 
   reconstruction() {
-    const patches = this.parts.reduce(
-      (sum, part) => sum + Number(part.patches),
-      0,
-    );
+    const patches = this.parts.reduce((sum, part) => sum + Number(part.patches), 0);
     const faces = this.parts.length * 2 * (this.rows - 1) ** 2;
-    const done = this.state === "DONE";
+    const done = this.state === 'DONE';
     return {
       id: this.id,
       state: `RECONSTRUCTION_STATE_${this.state}`,
       failure: this.failure,
-      optionsJson: "{}",
-      sceneReference: "",
+      optionsJson: '{}',
+      sceneReference: '',
       weight: 1,
       createTime: new Date(this.createTime).toISOString(),
-      ...(this.finishTime
-        ? { finishTime: new Date(this.finishTime).toISOString() }
-        : {}),
+      ...(this.finishTime ? { finishTime: new Date(this.finishTime).toISOString() } : {}),
       progress: {
         camerasTotal: this.order.length,
         camerasCommitted: this.parts.length + this.setAside(),
         camerasSetAside: this.setAside(),
-        camerasInFlight:
-          this.state === "RUNNING"
-            ? this.chosen - this.parts.length - this.setAside()
-            : 0,
-        jobsLeased: this.state === "RUNNING" ? this.workers.length : 0,
+        camerasInFlight: this.state === 'RUNNING' ? this.chosen - this.parts.length - this.setAside() : 0,
+        jobsLeased: this.state === 'RUNNING' ? this.workers.length : 0,
         patchesFiltered: String(Math.round(patches * 1.18)),
         patchesAccepted: String(patches),
-        vertices: done ? String(Math.round(faces / 2)) : "0",
-        faces: done ? String(faces) : "0",
+        vertices: done ? String(Math.round(faces / 2)) : '0',
+        faces: done ? String(faces) : '0',
       },
-      meshBytes: done ? String(faces * 30) : "0",
-      meshSha256: "",
+      meshBytes: done ? String(faces * 30) : '0',
+      meshSha256: '',
     };
   }
 
@@ -312,22 +263,15 @@ export class Simulation {
   incidenceJson() {
     const pairs = [];
     for (const { index, sequence } of this.cameras) {
-      if (sequence > 0)
-        for (const target of this.neighbours(index))
-          pairs.push({ reference: index, target });
+      if (sequence > 0) for (const target of this.neighbours(index)) pairs.push({ reference: index, target });
     }
     return { pairs };
   }
 
   preview(sequence, maxFaces) {
-    const part = this.parts.find(
-      (candidate) => candidate.sequence === sequence,
-    );
+    const part = this.parts.find((candidate) => candidate.sequence === sequence);
     if (part === undefined) return null;
-    const [column, row] = [
-      part.camera % this.columns,
-      Math.floor(part.camera / this.columns),
-    ];
+    const [column, row] = [part.camera % this.columns, Math.floor(part.camera / this.columns)];
     const [x0, y0] = [(column - 0.5) * CELL, (row - 0.5) * CELL];
     return makePreview({
       sequence,

@@ -18,8 +18,7 @@ function noise(x, y) {
 function houseAt(x, y) {
   const [i, j] = [Math.floor(x / 3), Math.floor(y / 3)];
   const [u, v] = [x / 3 - i, y / 3 - j];
-  const built =
-    hash(i + 7, j - 3) < 0.55 && u > 0.2 && u < 0.8 && v > 0.2 && v < 0.8;
+  const built = hash(i + 7, j - 3) < 0.55 && u > 0.2 && u < 0.8 && v > 0.2 && v < 0.8;
   if (!built) return null;
   const ridge = 1 - Math.abs(v - 0.5) / 0.3;
   return {

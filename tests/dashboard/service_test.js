@@ -1,0 +1,136 @@
+// The page against a real coordinator with two workers, from a folder of photographs to the downloaded mesh.
+import assert from 'node:assert/strict';
+import { spawn, spawnSync } from 'node:child_process';
+import { createHash } from 'node:crypto';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { DIST, keepScreenshot, launch, looksOfCanvas, meshNumbers, openPage, until, violations } from './browser.js';
+
+const MESHWRIGHT =
+  process.env.MESHWRIGHT ?? fileURLToPath(new URL('../../build/release/bin/meshwright', import.meta.url));
+const PATIENCE = { timeout: 240_000 };
+
+let browser;
+let folder;
+let service;
+let base = '';
+
+before(async () => {
+  folder = mkdtempSync(join(tmpdir(), 'meshwright-dashboard-'));
+  const scene = ['--cameras', '20', '--width', '560', '--height', '420', '--quiet'];
+  const made = spawnSync(MESHWRIGHT, ['synthesize', 'facade', '-o', join(folder, 'facade'), ...scene]);
+  assert.equal(made.status, 0, String(made.stderr));
+  const places = ['--data', join(folder, 'data'), '--dashboard', DIST];
+  const ports = ['--listen', '127.0.0.1:0', '--rest-listen', '127.0.0.1:0', '--workers', '2'];
+  service = spawn(MESHWRIGHT, ['up', ...places, ...ports], { stdio: ['ignore', 'pipe', 'inherit'] });
+  let said = '';
+  service.stdout.on('data', (text) => (said += text));
+  base = await until(() => {
+    assert.equal(service.exitCode, null, 'meshwright up has ended');
+    return /dashboard is at (\S+)/.exec(said)?.[1];
+  });
+  browser = await launch();
+});
+after(async () => {
+  await browser?.close();
+  if (service !== undefined && service.exitCode === null) {
+    const ended = new Promise((resolve) => service.once('exit', resolve));
+    service.kill('SIGTERM');
+    await ended;
+  }
+  rmSync(folder, { recursive: true, force: true });
+});
+
+async function submit(page, name, options = []) {
+  await page.goto(`${base}#/submit`);
+  await page.locator('.option').first().waitFor();
+  await page.locator('#folder-input').setInputFiles(join(folder, 'facade'));
+  await page.getByText('COLMAP scene').waitFor();
+  await page.getByLabel('Name', { exact: true }).fill(name);
+  for (const [group, option, value] of options) {
+    await page.locator('.option-group summary', { hasText: group }).click();
+    await page.locator(`#option-${option}`).fill(value);
+  }
+  await page.getByRole('button', { name: 'Submit', exact: true }).click();
+  await page.getByRole('heading', { name }).waitFor(PATIENCE);
+}
+
+const stateOf = (page) => page.locator('.page-head .badge').first().textContent();
+
+test('from a dropped folder to the downloaded mesh', { timeout: 600_000 }, async (t) => {
+  const page = await openPage(t, browser, base);
+  await submit(page, 'facade', [['Joining', 'min-component', '50']]);
+
+  // While it runs: progress moves, the mesh grows, by numbers and by pixels.
+  await until(async () => (await meshNumbers(page)).shown > 0, PATIENCE);
+  // The surface alone, from a place that stays.
+  await page.locator('.stage canvas').focus();
+  for (const key of ['c', 'ArrowLeft', 'ArrowRight']) await page.keyboard.press(key);
+  const seen = [];
+  await until(async () => {
+    const numbers = await meshNumbers(page);
+    if (numbers.shown > 0 && numbers.shown !== seen.at(-1)?.shown)
+      seen.push({ ...numbers, ...(await looksOfCanvas(page)) });
+    if (seen.length === 2) await keepScreenshot(page, 'service-growing', { fullPage: true });
+    return (await stateOf(page)) === 'Done';
+  }, PATIENCE);
+  console.log(
+    `# parts seen: ${seen.map(({ parts }) => parts).join(' ')}; faces: ${seen.map(({ faces }) => faces).join(' ')}`,
+  );
+  assert.ok(seen.length >= 2, `${seen.length} states of the mesh were seen`);
+  assert.ok(seen.at(-1).parts > seen[0].parts);
+  assert.ok(seen.at(-1).faces > seen[0].faces);
+  assert.ok(seen.at(-1).drawn > 1.05 * seen[0].drawn, `${seen[0].drawn}, then ${seen.at(-1).drawn} pixels`);
+
+  // What it took is in the charts.
+  await page.getByText(/mean of \d+ cameras/).waitFor();
+  const attempts = await fetch(`${base}v1/reconstructions/facade/attempts`);
+  const words = attempts.status === 501 ? 'this coordinator keeps no record of them' : /attempts on \d workers/;
+  await page.getByText(words).first().waitFor();
+
+  // Colours.
+  await until(async () => (await meshNumbers(page)).complete);
+  const photo = await looksOfCanvas(page);
+  await page.getByRole('radio', { name: 'Cameras', exact: true }).check({ force: true });
+  await until(async () => {
+    const camera = await looksOfCanvas(page);
+    return Math.hypot(...camera.mean.map((value, k) => value - photo.mean[k])) > 10;
+  });
+  await keepScreenshot(page, 'service-cameras', { fullPage: true });
+
+  // A camera: its photograph, its neighbours, its numbers.
+  await page.locator('.camera-row').first().click();
+  await until(() => page.locator('.photo img').evaluate((image) => image.complete && image.naturalWidth > 100));
+  await page.locator('.chips button').first().waitFor();
+  await page.getByText('Grown', { exact: true }).waitFor();
+  await keepScreenshot(page, 'service-camera');
+  assert.deepEqual(await violations(page), []);
+
+  // The mesh, as it is downloaded here and as the API has it.
+  await page.locator('.menu summary').click();
+  const [download] = await Promise.all([page.waitForEvent('download'), page.getByText('Mesh, PLY').click()]);
+  const bytes = readFileSync(await download.path());
+  const answer = await fetch(`${base}v1/reconstructions/facade/mesh`);
+  assert.ok(bytes.equals(Buffer.from(await answer.arrayBuffer())));
+  const { meshSha256, progress } = await (await fetch(`${base}v1/reconstructions/facade`)).json();
+  assert.equal(createHash('sha256').update(bytes).digest('hex'), meshSha256);
+  assert.equal(/element face (\d+)/.exec(bytes.subarray(0, 1000).toString('latin1'))[1], progress.faces);
+  assert.equal(download.suggestedFilename(), 'facade.ply');
+});
+
+test('another one is cancelled from the page', { timeout: 300_000 }, async (t) => {
+  const page = await openPage(t, browser, base);
+  await submit(page, 'unwanted');
+  await page.getByRole('button', { name: 'Cancel', exact: true }).click();
+  await page.getByRole('button', { name: 'Cancel it' }).click();
+  await page.locator('.badge', { hasText: 'Cancelled' }).waitFor(PATIENCE);
+  const { state } = await (await fetch(`${base}v1/reconstructions/unwanted`)).json();
+  assert.equal(state, 'RECONSTRUCTION_STATE_CANCELLED');
+  await page.goto(`${base}#/workers`);
+  await page.locator('.worker').nth(1).waitFor();
+  assert.deepEqual(await violations(page), []);
+  await keepScreenshot(page, 'service-workers');
+});
