@@ -105,7 +105,7 @@ test('from a dropped folder to the downloaded mesh', { timeout: 600_000 }, async
   await page.locator('.camera-row').first().click();
   await until(() => page.locator('.photo img').evaluate((image) => image.complete && image.naturalWidth > 100));
   await page.locator('.chips button').first().waitFor();
-  await page.getByText('Grown', { exact: true }).waitFor();
+  await page.locator('.camera-details').getByText('Grown', { exact: true }).waitFor();
   await keepScreenshot(page, 'service-camera');
   assert.deepEqual(await violations(page), []);
 
