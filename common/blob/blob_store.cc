@@ -5,7 +5,20 @@
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 
+#include "common/base/files.h"
+#include "common/base/status_macros.h"
+
 namespace meshwright {
+
+absl::StatusOr<std::string> BlobStore::PutFile(const std::string& path) {
+  MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  return Put(bytes);
+}
+
+absl::Status BlobStore::GetFile(const std::string& digest, const std::string& path) {
+  MW_ASSIGN_OR_RETURN(const std::string bytes, Get(digest));
+  return WriteFileAtomically(path, bytes);
+}
 
 absl::Status ValidateDigest(const std::string& digest) {
   constexpr size_t kDigits = 64;

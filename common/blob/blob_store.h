@@ -18,6 +18,10 @@ class BlobStore {
   virtual absl::StatusOr<std::string> Put(const std::string& bytes) = 0;
   // NotFound, or DataLoss when what is stored does not have this digest: the digest is checked on every read.
   virtual absl::StatusOr<std::string> Get(const std::string& digest) = 0;
+  // The same for a file, so that large ones need not be in memory where the store can do without: Put of its bytes, and
+  // Get into a file that appears whole or not at all.
+  virtual absl::StatusOr<std::string> PutFile(const std::string& path);
+  virtual absl::Status GetFile(const std::string& digest, const std::string& path);
   virtual absl::StatusOr<bool> Has(const std::string& digest) = 0;
   // Deleting what is not there is harmless.
   virtual absl::Status Delete(const std::string& digest) = 0;

@@ -82,6 +82,25 @@ TEST_P(BlobStoreConformanceTest, PuttingTwiceIsHarmless) {
   EXPECT_TRUE(*store().Get(*first) == bytes);
 }
 
+TEST_P(BlobStoreConformanceTest, FilesAreBlobsToo) {
+  const std::string path = testing::TempDir() + "file_of_a_blob";
+  const std::string bytes = RandomBytes(9, 3'000'000);
+  ASSERT_TRUE(WriteFileAtomically(path, bytes).ok());
+  const auto digest = store().PutFile(path);
+  ASSERT_TRUE(digest.ok()) << digest.status();
+  EXPECT_EQ(*digest, Sha256Hex(bytes));
+  EXPECT_TRUE(*store().Get(*digest) == bytes);
+  std::remove(path.c_str());
+  EXPECT_EQ(store().PutFile(path).status().code(), absl::StatusCode::kNotFound);
+  ASSERT_TRUE(store().GetFile(*digest, path).ok());
+  EXPECT_TRUE(*ReadFile(path) == bytes);
+  std::remove(path.c_str());
+  harness_->Overwrite(*digest, bytes.substr(1));
+  EXPECT_EQ(store().GetFile(*digest, path).code(), absl::StatusCode::kDataLoss);
+  EXPECT_EQ(ReadFile(path).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(store().GetFile(Sha256Hex(std::string("nothing")), path).code(), absl::StatusCode::kNotFound);
+}
+
 TEST_P(BlobStoreConformanceTest, DeletedBlobsAreGoneAndOthersStay) {
   const std::string gone = *store().Put("gone");
   const std::string kept = *store().Put("kept");

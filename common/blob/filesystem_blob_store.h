@@ -20,6 +20,8 @@ class FilesystemBlobStore : public BlobStore {
 
   absl::StatusOr<std::string> Put(const std::string& bytes) override;
   absl::StatusOr<std::string> Get(const std::string& digest) override;
+  absl::StatusOr<std::string> PutFile(const std::string& path) override;
+  absl::Status GetFile(const std::string& digest, const std::string& path) override;
   absl::StatusOr<bool> Has(const std::string& digest) override;
   absl::Status Delete(const std::string& digest) override;
 
@@ -28,6 +30,7 @@ class FilesystemBlobStore : public BlobStore {
 
  private:
   explicit FilesystemBlobStore(std::string root);
+  absl::Status MakeFolderOf(const std::string& path);
   std::string root_;
 };
 

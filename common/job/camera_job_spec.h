@@ -22,6 +22,7 @@ struct CameraJobSpec {
   CameraIndex camera = 0;
   SequenceNumber snapshot = 0;
   int64_t epoch = 1;                      // to be named with the result
+  int reduction = 0;                      // how many times the job was made smaller after it ran out of memory
   std::vector<CameraIndex> neighbours;    // O_r as of the snapshot, ascending
   std::vector<CameraIndex> targets;       // the chosen part of it, best first
   std::vector<AcceptedSurface> accepted;  // what may hide something from r: accepted in commits <= snapshot by cameras

@@ -1,0 +1,36 @@
+#include "common/job/job_spec_codec.h"
+
+#include <absl/strings/str_cat.h>
+#include <nlohmann/json.hpp>
+
+namespace meshwright {
+
+using Json = nlohmann::ordered_json;
+
+std::string EncodeJobSpec(const StoredJobSpec& spec) {
+  Json json = {{"targets", spec.targets}, {"accepted", Json::array()}, {"memory_bytes", spec.memory_bytes}};
+  for (const AcceptedSurface& surface : spec.accepted) {
+    json["accepted"].push_back({surface.sequence, surface.camera, surface.digest, surface.patches});
+  }
+  return json.dump();
+}
+
+absl::StatusOr<StoredJobSpec> DecodeJobSpec(const std::string& text) {
+  StoredJobSpec spec;
+  try {
+    const Json json = Json::parse(text);
+    spec.targets = json.at("targets").get<std::vector<CameraIndex>>();
+    spec.memory_bytes = json.at("memory_bytes").get<std::vector<int64_t>>();
+    for (const Json& surface : json.at("accepted")) {
+      spec.accepted.push_back({.sequence = surface.at(0).get<SequenceNumber>(),
+                               .camera = surface.at(1).get<CameraIndex>(),
+                               .digest = surface.at(2).get<std::string>(),
+                               .patches = surface.at(3).get<int64_t>()});
+    }
+  } catch (const Json::exception& error) {
+    return absl::DataLossError(absl::StrCat("not a camera job's specification: ", error.what()));
+  }
+  return spec;
+}
+
+}  // namespace meshwright
