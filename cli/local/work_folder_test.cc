@@ -42,7 +42,7 @@ TEST_F(WorkFolderTest, GoesOnWithWhatItHolds) {
     ASSERT_TRUE(folder.ok()) << folder.status();
     EXPECT_FALSE((*folder)->resumed());
     digest = *(*folder)->blobs().Put("surface");
-    ASSERT_TRUE((*folder)->store().AssignCameraJob(WorkFolder::kReconstructionId, 1, 4, 0, clock_.Now()).ok());
+    ASSERT_TRUE((*folder)->store().AssignCameraJob(WorkFolder::kReconstructionId, {1, 4, 0}, clock_.Now()).ok());
   }
   auto folder = Open('a', R"({"window":3})");
   ASSERT_TRUE(folder.ok()) << folder.status();

@@ -1,13 +1,11 @@
 #include "cli/service/coordinator_program.h"
 
 #include <algorithm>
-#include <condition_variable>
 #include <filesystem>
-#include <mutex>
-#include <thread>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <unistd.h>
 
 #include "cli/service/open_rest.h"
 #include "cli/service/open_stores.h"
@@ -34,8 +32,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Several times in the time of a lease, and not too often.
-constexpr int kLooksPerLease = 5;
+// Another coordinator takes over so long after this one has died.
+constexpr absl::Duration kConductorLease = absl::Seconds(5);
+
+// The same for every process on this data folder, and no other.
+std::string NameOf(const std::string& data_folder) {
+  char host[256] = "";
+  if (::gethostname(host, sizeof(host) - 1) != 0) host[0] = '\0';
+  std::error_code error;
+  const fs::path path = fs::canonical(data_folder, error);
+  return absl::StrCat(host, ":", error ? data_folder : path.string());
+}
 
 class RealCoordinatorProgram final : public CoordinatorProgram {
  public:
@@ -43,19 +50,9 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
       : settings_(settings),
         lease_{.lease = absl::Seconds(settings.lease_seconds),
                .job_time_limit = absl::Seconds(settings.job_time_limit_seconds)},
-        pool_(settings.threads),
-        workers_(lease_, clock_) {}
+        pool_(settings.threads) {}
 
-  ~RealCoordinatorProgram() override {
-    Shutdown(absl::Seconds(1));
-    if (!ticker_.joinable()) return;
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      stopping_ = true;
-    }
-    wake_.notify_all();
-    ticker_.join();
-  }
+  ~RealCoordinatorProgram() override { Shutdown(absl::Seconds(1)); }
 
   absl::Status Open() {
     MW_RETURN_IF_ERROR(lease_.Validate());
@@ -76,22 +73,25 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
     MW_ASSIGN_OR_RETURN(unmeasured_blobs_,
                         OpenBlobStore(settings_.blobs.empty() ? absl::StrCat(data, "/blobs") : settings_.blobs));
     blobs_ = std::make_unique<MeasuredBlobStore>(*unmeasured_blobs_, metrics_);
+    workers_ = std::make_unique<WorkerLogic>(lease_, RetryOptions(), *store_);
     const ConductingEnvironment environment = {.store = store_.get(),
                                                .blobs = blobs_.get(),
                                                .clock = &clock_,
                                                .pool = &pool_,
-                                               .workers = &workers_,
+                                               .workers = workers_.get(),
                                                .parse_method = ParseCoordinatorMethod};
     MW_ASSIGN_OR_RETURN(reconstructions_,
-                        ReconstructionLogic::Open(
-                            {.data_folder = settings_.data_folder, .scene_roots = settings_.scene_roots}, environment));
+                        ReconstructionLogic::Open({.data_folder = data,
+                                                   .scene_roots = settings_.scene_roots,
+                                                   .name = NameOf(data),
+                                                   .conductor_lease = std::min(lease_.lease, kConductorLease)},
+                                                  environment));
     GrpcServer::Interceptors interceptors;
     interceptors.push_back(MakeRpcMetrics(metrics_));
     MW_ASSIGN_OR_RETURN(
-        server_, GrpcServer::Start(settings_.listen, *reconstructions_, workers_, *blobs_, std::move(interceptors)));
-    MW_ASSIGN_OR_RETURN(rest_server_, OpenRest(settings_, *reconstructions_, workers_, *blobs_, *store_));
+        server_, GrpcServer::Start(settings_.listen, *reconstructions_, *workers_, *blobs_, std::move(interceptors)));
+    MW_ASSIGN_OR_RETURN(rest_server_, OpenRest(settings_, *reconstructions_, *workers_, *blobs_, *store_));
     MW_RETURN_IF_ERROR(ServeMetrics());
-    ticker_ = std::thread([this] { Tick(); });
     return absl::OkStatus();
   }
 
@@ -107,16 +107,10 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
  private:
   absl::Status ServeMetrics() {
     if (settings_.metrics_listen.empty()) return absl::OkStatus();
-    AddClusterGauges(metrics_, *database_, workers_, settings_.data_folder);
+    AddClusterGauges(metrics_, *database_, *workers_, settings_.data_folder);
     const auto ready = [this] { return database_->Now().status(); };
     MW_ASSIGN_OR_RETURN(metrics_server_, MetricsServer::Start(settings_.metrics_listen, metrics_, ready));
     return absl::OkStatus();
-  }
-
-  void Tick() {
-    const auto every = absl::ToChronoMilliseconds(lease_.lease / kLooksPerLease);
-    std::unique_lock<std::mutex> lock(mutex_);
-    while (!wake_.wait_for(lock, every, [&] { return stopping_; })) workers_.ExpireLeases();
   }
 
   const CoordinatorSettings settings_;
@@ -125,19 +119,15 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
   Metrics metrics_{"coordinator"};
   const Logger log_ = Logger::ToStderr();
   ThreadPool pool_;
-  WorkerLogic workers_;
   std::unique_ptr<JobStore> store_;
   SqlDatabase* database_ = nullptr;  // the store's
   std::unique_ptr<BlobStore> unmeasured_blobs_;
   std::unique_ptr<BlobStore> blobs_;
+  std::unique_ptr<WorkerLogic> workers_;
   std::unique_ptr<ReconstructionLogic> reconstructions_;
   std::unique_ptr<GrpcServer> server_;
   std::unique_ptr<RestServer> rest_server_;  // null: none
   std::unique_ptr<MetricsServer> metrics_server_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;
-  std::thread ticker_;
 };
 
 }  // namespace

@@ -78,8 +78,9 @@ absl::StatusOr<Method> ParseCoordinatorMethod(const std::string& options_json) {
                    .conductor = options.conductor,
                    .join = options.join};
   method.job_bytes = [job = options.job](const CameraJobSpec& spec, const std::vector<Camera>& cameras) {
-    return EstimateInputBytes(spec, cameras, job.lattice_step) +
-           EstimateCameraJobBytes(cameras[static_cast<size_t>(spec.camera)], job);
+    const CameraJobOptions reduced = Reduced(job, spec.reduction);
+    return EstimateInputBytes(spec, cameras, reduced.lattice_step) +
+           EstimateCameraJobBytes(cameras[static_cast<size_t>(spec.camera)], reduced);
   };
   return method;
 }

@@ -7,6 +7,28 @@
 
 #include "cli/console.h"
 #include "cli/service/program_options.h"
+#include "cli/service/worker_keeper.h"
+
+namespace {
+
+int Work(const meshwright::WorkerSettings& settings) {
+  const auto worker = meshwright::WorkerProgram::Make(settings);
+  if (!worker.ok()) return meshwright::Fail(worker.status());
+  if (const int port = (*worker)->metrics_port(); port > 0) {
+    std::printf("metrics on port %d\n", port);
+    std::fflush(stdout);
+  }
+  std::thread([&] {
+    meshwright::WaitForStopSignal();
+    (*worker)->Drain();
+  }).detach();
+  (*worker)->Run();
+  // Jobs that were given back may still run: nobody waits for them.
+  std::fflush(nullptr);
+  ::_exit(meshwright::kExitDone);
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace meshwright;
@@ -24,18 +46,9 @@ int main(int argc, char** argv) {
     if (error.get_exit_code() == 0) return program.exit(error);
     return FailWrongUse(absl::StrCat(error.what(), " (--help shows what is expected)"));
   }
-  const auto worker = WorkerProgram::Make(settings);
-  if (!worker.ok()) return Fail(worker.status());
-  if (const int port = (*worker)->metrics_port(); port > 0) {
-    std::printf("metrics on port %d\n", port);
-    std::fflush(stdout);
-  }
-  std::thread([&] {
-    WaitForStopSignal();
-    (*worker)->Drain();
-  }).detach();
-  (*worker)->Run();
-  // Jobs that were given back may still run: nobody waits for them.
-  std::fflush(nullptr);
-  ::_exit(kExitDone);
+  if (settings.id.empty()) settings.id = DefaultWorkerId();
+  return KeepAlive([&](bool ran_out_of_memory) {
+    settings.ran_out_of_memory = ran_out_of_memory;
+    return Work(settings);
+  });
 }

@@ -21,12 +21,6 @@
 namespace meshwright {
 namespace {
 
-std::string DefaultId() {
-  char host[64] = "worker";
-  if (::gethostname(host, sizeof(host) - 1) != 0) host[0] = '\0';
-  return absl::StrCat(host, "-", ::getpid());
-}
-
 int64_t MemoryMib(const WorkerSettings& settings) {
   return settings.memory_mib > 0 ? settings.memory_mib : std::max<int64_t>(1024, int64_t{512} * settings.cores);
 }
@@ -35,7 +29,7 @@ class RealWorkerProgram final : public WorkerProgram {
  public:
   RealWorkerProgram(const WorkerSettings& settings, std::unique_ptr<GrpcCoordinator> coordinator,
                     std::unique_ptr<BlobStore> shared_blobs)
-      : id_(settings.id.empty() ? DefaultId() : settings.id),
+      : id_(settings.id.empty() ? DefaultWorkerId() : settings.id),
         log_(Logger::ToStderr().With({{"worker", id_}})),
         coordinator_(std::move(coordinator)),
         shared_blobs_(std::move(shared_blobs)),
@@ -47,7 +41,8 @@ class RealWorkerProgram final : public WorkerProgram {
              .version = MW_VERSION,
              .cores = settings.cores,
              .memory_bytes = MemoryMib(settings) << 20,
-             .drain = absl::Seconds(settings.drain_seconds)},
+             .drain = absl::Seconds(settings.drain_seconds),
+             .ran_out_of_memory = settings.ran_out_of_memory},
             channel_, blobs_, ParseWorkerMethod,
             [](const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
               return RunCameraJob(input, options, pool);
@@ -80,6 +75,12 @@ class RealWorkerProgram final : public WorkerProgram {
 };
 
 }  // namespace
+
+std::string DefaultWorkerId() {
+  char host[64] = "worker";
+  if (::gethostname(host, sizeof(host) - 1) != 0) host[0] = '\0';
+  return absl::StrCat(host, "-", ::getpid());
+}
 
 absl::StatusOr<std::unique_ptr<WorkerProgram>> WorkerProgram::Make(const WorkerSettings& settings) {
   std::unique_ptr<BlobStore> shared_blobs;

@@ -14,8 +14,12 @@ struct WorkerSettings {
   int cores = 1;
   int64_t memory_mib = 0;  // 0: 512 for each core, at least 1024
   double drain_seconds = 30;
-  std::string metrics_listen;  // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
+  bool ran_out_of_memory = false;  // the process of this worker before this one was killed since memory ran out
+  std::string metrics_listen;      // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
 };
+
+// Host name and process.
+std::string DefaultWorkerId();
 
 // A worker as meshwright-worker and "meshwright up" run it.
 class WorkerProgram {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <filesystem>
 
 #include <absl/strings/str_cat.h>
@@ -10,20 +11,28 @@
 #include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
+#include "common/blob/lost_blob.h"
 #include "common/scene/scene_codec.h"
 #include "common/scene/view.h"
-#include "coordinator/api/scene_intake.h"
 #include "coordinator/conductor/accepted_mesh.h"
 
 namespace meshwright {
 namespace {
 
+namespace fs = std::filesystem;
+
 // Errors of the store and the blobs (a full disk, a server that is away) are waited out for some minutes.
 constexpr int kMaxTroubles = 12;
 constexpr std::chrono::seconds kTroubleDelay(10);
+// Results that other coordinators took are noticed by looking again.
+constexpr std::chrono::milliseconds kLookAgain(250);
+// A job is made smaller at most so often; each time its lattice is spaced twice as wide.
+constexpr int kMaxReductions = 2;
+constexpr int kMaxRepairsInARow = 100;
 
-bool IsFinal(const absl::Status& status) {
-  return IsBadInput(status) || absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status);
+bool IsHopeless(const absl::Status& status) {
+  return IsBadInput(status) || absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status) ||
+         absl::IsDataLoss(status);
 }
 
 absl::Status Stopped() { return absl::CancelledError("stopped"); }
@@ -34,16 +43,15 @@ struct FileFacts {
 };
 
 absl::StatusOr<FileFacts> FactsOf(const std::string& path) {
-  std::FILE* const file = std::fopen(path.c_str(), "rb");
-  if (file == nullptr) return absl::NotFoundError(absl::StrCat(path, ": cannot be read"));
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+  if (file == nullptr) return absl::InternalError(absl::StrCat(path, ": cannot be read"));
   std::vector<uint8_t> buffer(size_t{1} << 20);
   Sha256Stream digest;
   FileFacts facts;
-  while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), file)) {
+  while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), file.get())) {
     digest.Update(absl::MakeConstSpan(buffer.data(), count));
     facts.bytes += static_cast<int64_t>(count);
   }
-  std::fclose(file);
   facts.sha256 = digest.HexDigest();
   return facts;
 }
@@ -51,15 +59,20 @@ absl::StatusOr<FileFacts> FactsOf(const std::string& path) {
 }  // namespace
 
 ConductedReconstruction::ConductedReconstruction(const ConductingEnvironment& environment,
-                                                 const ReconstructionRecord& record, std::string scene_folder,
-                                                 std::string mesh_path, Update update, std::function<void()> changed)
+                                                 const CoordinatorFolders& folders, std::string id, int64_t epoch,
+                                                 bool is_deleting, std::function<void(bool)> changed)
     : environment_(environment),
-      record_(record),
-      scene_folder_(std::move(scene_folder)),
-      mesh_path_(std::move(mesh_path)),
-      update_(std::move(update)),
-      changed_(std::move(changed)) {
-  thread_ = std::thread([this] { Run(); });
+      folders_(folders),
+      id_(std::move(id)),
+      epoch_(epoch),
+      is_deleting_(is_deleting),
+      changed_(std::move(changed)),
+      held_blobs_(id_, *environment.store, *environment.blobs) {
+  thread_ = std::thread([this] {
+    Run();
+    has_ended_ = true;
+    changed_(true);
+  });
 }
 
 ConductedReconstruction::~ConductedReconstruction() {
@@ -75,189 +88,230 @@ void ConductedReconstruction::RequestStop() {
   wake_.notify_all();
 }
 
-ConductedReconstruction::Snapshot ConductedReconstruction::snapshot() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return snapshot_;
+void ConductedReconstruction::Wake() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    has_news_ = true;
+  }
+  wake_.notify_all();
 }
 
-absl::Status ConductedReconstruction::Change(const std::function<void(ReconstructionRecord&)>& change) {
-  MW_ASSIGN_OR_RETURN(const bool still_wanted, update_(change));
-  if (!still_wanted) return Stopped();
-  change(record_);
-  return absl::OkStatus();
+bool ConductedReconstruction::WaitForNews() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  wake_.wait_for(lock, kLookAgain, [&] { return stopping_ || has_news_; });
+  has_news_ = false;
+  return !stopping_;
+}
+
+absl::Status ConductedReconstruction::SetState(ReconstructionState state, const std::string& reason) {
+  const absl::Status status =
+      environment_.store->SetReconstructionState(id_, state, environment_.clock->Now(), reason, epoch_);
+  changed_(false);
+  // Cancelled or deleted meanwhile.
+  return absl::IsFailedPrecondition(status) || absl::IsNotFound(status) ? Stopped() : status;
 }
 
 void ConductedReconstruction::Run() {
   for (int troubles = 1;; ++troubles) {
     const absl::Status status = Conduct();
-    environment_.workers->RemoveReconstruction(record_.id);
     {
-      std::unique_lock<std::mutex> lock(mutex_);
-      if (status.ok() || stopping_ || absl::IsCancelled(status)) return;
-      outcomes_.clear();
+      const std::lock_guard<std::mutex> lock(mutex_);
+      // Aborted: somebody else conducts it now.
+      if (status.ok() || stopping_ || absl::IsCancelled(status) || absl::IsAborted(status)) return;
     }
-    handed_out_.clear();
-    if (IsFinal(status) || troubles == kMaxTroubles) {
-      (void)update_([&](ReconstructionRecord& record) {
-        record.state = v1::RECONSTRUCTION_STATE_FAILED;
-        record.failure = std::string(status.message());
-        record.finished = environment_.clock->Now();
-      });
+    if (IsHopeless(status) || troubles == kMaxTroubles) {
+      SetState(ReconstructionState::kFailed, std::string(status.message())).IgnoreError();
       return;
     }
     std::unique_lock<std::mutex> lock(mutex_);
-    wake_.wait_for(lock, kTroubleDelay, [&] { return stopping_; });
+    if (wake_.wait_for(lock, kTroubleDelay, [&] { return stopping_; })) return;
   }
 }
 
 absl::Status ConductedReconstruction::Conduct() {
+  if (is_deleting_) return DeleteEverything();
+  MW_ASSIGN_OR_RETURN(record_, environment_.store->GetReconstruction(id_));
+  if (IsFinal(record_.state) || record_.state == ReconstructionState::kDeleting) return absl::OkStatus();
   MW_ASSIGN_OR_RETURN(const Method method, environment_.parse_method(record_.options_json));
   MW_RETURN_IF_ERROR(PrepareScene(method));
-  absl::StatusOr<std::unique_ptr<Conductor>> conductor =
-      Conductor::Open(record_.id, cameras_, points_, method.conductor, environment_.store, environment_.blobs,
-                      environment_.clock, environment_.pool);
-  if (absl::IsFailedPrecondition(conductor.status())) return BadInput(conductor.status());
-  MW_RETURN_IF_ERROR(conductor.status());
-  MW_RETURN_IF_ERROR(Change([](ReconstructionRecord& record) { record.state = v1::RECONSTRUCTION_STATE_RUNNING; }));
-  environment_.workers->AddReconstruction(record_.id, {.weight = record_.weight,
-                                                       .options_json = record_.options_json,
-                                                       .scene_digest = record_.scene_blob,
-                                                       .sink = [this](JobOutcome outcome) {
-                                                         {
-                                                           const std::lock_guard<std::mutex> lock(mutex_);
-                                                           outcomes_.push_back(std::move(outcome));
-                                                         }
-                                                         wake_.notify_all();
-                                                       }});
-  MW_RETURN_IF_ERROR(RunJobs(method, **conductor));
-  return Join(method, **conductor);
+  MW_ASSIGN_OR_RETURN(const std::unique_ptr<Conductor> conductor, OpenConductor(method));
+  MW_RETURN_IF_ERROR(SetState(ReconstructionState::kRunning));
+  environment_.workers->Wake();
+  MW_RETURN_IF_ERROR(RunJobs(*conductor));
+  return Join(method, *conductor);
+}
+
+absl::Status ConductedReconstruction::DeleteEverything() {
+  MW_ASSIGN_OR_RETURN(const std::vector<std::string> blobs, environment_.store->LetBlobsVanish(id_));
+  for (const std::string& digest : blobs) {
+    MW_RETURN_IF_ERROR(environment_.blobs->Delete(digest));
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (stopping_) return Stopped();
+  }
+  return environment_.store->DeleteReconstruction(id_);
+}
+
+absl::StatusOr<std::string> ConductedReconstruction::SceneFolder(bool* is_temporary) {
+  *is_temporary = record_.scene_reference.empty();
+  if (!*is_temporary) {
+    absl::StatusOr<std::string> folder = ResolveSceneReference(record_.scene_reference, folders_.scene_roots);
+    if (!folder.ok()) return BadInput(folder.status());
+    return folder;
+  }
+  std::string folder = absl::StrCat(folders_.data, "/uploads/", id_, "-", epoch_);
+  MW_ASSIGN_OR_RETURN(const std::vector<SceneFile> files, environment_.store->ListSceneFiles(id_));
+  MW_RETURN_IF_ERROR(LayOutScene(files, *environment_.blobs, folder));
+  return folder;
+}
+
+absl::StatusOr<TakenScene> ConductedReconstruction::Take() {
+  bool is_temporary = false;
+  MW_ASSIGN_OR_RETURN(const std::string folder, SceneFolder(&is_temporary));
+  absl::StatusOr<TakenScene> taken = TakeScene(folder, held_blobs_, *environment_.pool);
+  std::error_code error;
+  if (is_temporary) fs::remove_all(folder, error);
+  return taken;
 }
 
 absl::Status ConductedReconstruction::PrepareScene(const Method& method) {
   if (record_.scene_blob.empty()) {
-    MW_ASSIGN_OR_RETURN(const TakenScene taken, TakeScene(scene_folder_, *environment_.blobs, *environment_.pool));
-    const absl::Status created = environment_.store->CreateReconstruction(
-        {.id = record_.id, .options_json = record_.options_json, .scene_digest = taken.scene_digest},
-        environment_.clock->Now());
-    if (!absl::IsAlreadyExists(created)) MW_RETURN_IF_ERROR(created);
-    MW_RETURN_IF_ERROR(Change([&](ReconstructionRecord& record) { record.scene_blob = taken.scene_blob; }));
+    MW_ASSIGN_OR_RETURN(const TakenScene taken, Take());
+    MW_RETURN_IF_ERROR(environment_.store->SetReconstructionScene(id_, taken.scene_digest, taken.scene_blob, epoch_));
+    record_.scene_blob = taken.scene_blob;
   }
-  MW_ASSIGN_OR_RETURN(const std::string bytes, environment_.blobs->Get(record_.scene_blob));
-  MW_ASSIGN_OR_RETURN(Scene scene, DecodeScene(bytes));
+  absl::StatusOr<std::string> bytes = environment_.blobs->Get(record_.scene_blob);
+  if (IsBlobLost(bytes.status())) {
+    MW_ASSIGN_OR_RETURN(const TakenScene taken, Take());
+    bytes = environment_.blobs->Get(record_.scene_blob);
+  }
+  MW_RETURN_IF_ERROR(bytes.status());
+  MW_ASSIGN_OR_RETURN(Scene scene, DecodeScene(*bytes));
   cameras_.clear();
-  for (const SceneView& view : scene.views) cameras_.push_back(UndistortedCamera(view, method.max_image_size));
+  photographs_.clear();
+  for (const SceneView& view : scene.views) {
+    cameras_.push_back(UndistortedCamera(view, method.max_image_size));
+    photographs_[view.image_path] = view.name;
+  }
   points_ = std::move(scene.points);
   return absl::OkStatus();
 }
 
-void ConductedReconstruction::PublishProgress(const Conductor& conductor) {
-  Snapshot snapshot = {.progress = conductor.progress()};
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    snapshot.pairs = std::move(snapshot_.pairs);
-    snapshot_ = std::move(snapshot);
-  }
-  changed_();
-}
-
-void ConductedReconstruction::OfferJobs(const Method& method, Conductor& conductor) {
-  for (CameraJobSpec& spec : conductor.TakeJobs()) {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      for (const CameraIndex target : spec.neighbours) snapshot_.pairs.emplace_back(spec.camera, target);
+absl::StatusOr<std::unique_ptr<Conductor>> ConductedReconstruction::OpenConductor(const Method& method) {
+  const auto job_bytes = [this, &method](CameraJobSpec spec) {
+    std::vector<int64_t> bytes;
+    for (spec.reduction = 0; spec.reduction <= kMaxReductions; ++spec.reduction) {
+      bytes.push_back(method.job_bytes(spec, cameras_));
     }
-    handed_out_[spec.sequence] = spec;
-    const int64_t bytes = method.job_bytes(spec, cameras_);
-    environment_.workers->Offer(record_.id, std::move(spec), bytes, absl::InfinitePast());
-  }
-}
-
-bool ConductedReconstruction::WaitForOutcome(JobOutcome& outcome) {
-  std::unique_lock<std::mutex> lock(mutex_);
-  wake_.wait(lock, [&] { return stopping_ || !outcomes_.empty(); });
-  if (stopping_) return false;
-  outcome = std::move(outcomes_.front());
-  outcomes_.pop_front();
-  return true;
-}
-
-absl::Status ConductedReconstruction::RunJobs(const Method& method, Conductor& conductor) {
-  while (true) {
-    OfferJobs(method, conductor);
-    PublishProgress(conductor);
-    if (conductor.finished()) return absl::OkStatus();
-    JobOutcome outcome;
-    if (!WaitForOutcome(outcome)) return Stopped();
-    MW_RETURN_IF_ERROR(Handle(method, conductor, outcome));
-  }
-}
-
-absl::Status ConductedReconstruction::Handle(const Method& method, Conductor& conductor, const JobOutcome& outcome) {
-  Attempts& attempts = attempts_[outcome.sequence];
-  JobOutcome failed = outcome;
-  const auto delay_after = [&](int attempt) {
-    return std::min(environment_.retry.backoff * (int64_t{1} << std::min(attempt - 1, 20)),
-                    environment_.retry.max_backoff);
+    return bytes;
   };
-  switch (outcome.kind) {
-    case JobOutcome::Kind::kFinished: {
-      const absl::Status status = conductor.Complete(outcome.sequence, outcome.epoch, outcome.filtered_digest,
-                                                     outcome.weak_targets, outcome.report_json);
-      if (status.ok() || absl::IsAborted(status)) return absl::OkStatus();
-      // The worker's word is not to be relied upon: weak targets that are none, a surface that is not there.
-      if (!absl::IsInvalidArgument(status) && !absl::IsFailedPrecondition(status)) return status;
-      failed.reason = std::string(status.message());
-      break;
-    }
-    case JobOutcome::Kind::kGivenBack:
-      return TryAgain(method, outcome, absl::ZeroDuration());
-    case JobOutcome::Kind::kLost:
-      if (++attempts.losses < environment_.retry.max_losses) {
-        return TryAgain(method, outcome,
-                        attempts.losses == 1 ? absl::ZeroDuration() : delay_after(attempts.losses - 1));
-      }
-      failed.reason = absl::StrCat("lost ", attempts.losses, " workers, the last one: ", outcome.reason);
-      attempts.failures = environment_.retry.max_failures - 1;
-      break;
-    case JobOutcome::Kind::kFailed:
-      break;
-  }
-  if (++attempts.failures < environment_.retry.max_failures) {
-    return TryAgain(method, failed, delay_after(attempts.failures));
-  }
-  const absl::Status status = conductor.SetAside(outcome.sequence, outcome.epoch, failed.reason);
-  return absl::IsAborted(status) ? absl::OkStatus() : status;
+  absl::StatusOr<std::unique_ptr<Conductor>> conductor =
+      Conductor::Open(id_, cameras_, points_, method.conductor, environment_.store, environment_.blobs,
+                      environment_.clock, environment_.pool, {.epoch = epoch_, .job_bytes = job_bytes});
+  if (absl::IsFailedPrecondition(conductor.status())) return BadInput(conductor.status());
+  return conductor;
 }
 
-absl::Status ConductedReconstruction::TryAgain(const Method& method, const JobOutcome& outcome, absl::Duration delay) {
-  const auto found = handed_out_.find(outcome.sequence);
-  if (found == handed_out_.end() || found->second.epoch != outcome.epoch) return absl::OkStatus();
-  CameraJobSpec& spec = found->second;
-  const absl::Time now = environment_.clock->Now();
-  MW_ASSIGN_OR_RETURN(spec.epoch, environment_.store->ReassignCameraJob(record_.id, spec.sequence, now));
-  environment_.workers->Offer(record_.id, spec, method.job_bytes(spec, cameras_), now + delay);
+absl::Status ConductedReconstruction::RunJobs(Conductor& conductor) {
+  while (true) {
+    absl::StatusOr<bool> handed_out = conductor.Absorb(environment_.retry.max_failures);
+    if (const std::string damaged = conductor.damaged_blob(); !handed_out.ok() && !damaged.empty()) {
+      MW_RETURN_IF_ERROR(Repair(conductor, damaged));
+      continue;
+    }
+    MW_RETURN_IF_ERROR(handed_out.status());
+    if (*handed_out) environment_.workers->Wake();
+    changed_(false);
+    MW_RETURN_IF_ERROR(LookAtReports(conductor));
+    if (conductor.finished()) return absl::OkStatus();
+    if (!WaitForNews()) return Stopped();
+  }
+}
+
+absl::Status ConductedReconstruction::LookAtReports(Conductor& conductor) {
+  MW_ASSIGN_OR_RETURN(const std::vector<std::string> reported, environment_.store->ListDamagedBlobs(id_));
+  for (const std::string& digest : reported) {
+    const absl::Status status = environment_.blobs->Get(digest).status();
+    if (IsBlobLost(status)) MW_RETURN_IF_ERROR(Repair(conductor, digest));
+    if (!status.ok() && !IsBlobLost(status)) return status;
+    MW_RETURN_IF_ERROR(environment_.store->ForgetDamagedBlob(id_, digest));
+  }
   return absl::OkStatus();
 }
 
-absl::Status ConductedReconstruction::Join(const Method& method, const Conductor& conductor) {
-  MW_RETURN_IF_ERROR(Change([](ReconstructionRecord& record) { record.state = v1::RECONSTRUCTION_STATE_JOINING; }));
-  const std::vector<AcceptedSurface> surfaces = conductor.AcceptedSurfaces();
-  if (surfaces.empty()) {
+// What is lost is made again, and must come out the same: a surface by its job or its acceptance, a photograph from the
+// scene, as long as that is there.
+absl::Status ConductedReconstruction::Repair(Conductor& conductor, const std::string& digest) {
+  const auto photograph = photographs_.find(digest);
+  if (photograph != photographs_.end() || digest == record_.scene_blob) {
+    const std::string what = photograph == photographs_.end() ? "the scene's cameras and points"
+                                                              : absl::StrCat("photograph ", photograph->second);
+    const absl::StatusOr<TakenScene> taken = Take();
+    if (taken.ok() && taken->scene_blob == record_.scene_blob) return absl::OkStatus();
+    if (!taken.ok() && !IsHopeless(taken.status()) && !absl::IsNotFound(taken.status())) return taken.status();
+    return absl::DataLossError(
+        absl::StrCat(what, " is damaged or lost (blob ", digest, "), and cannot be read again: ",
+                     taken.ok() ? std::string("the scene is not what it was") : std::string(taken.status().message())));
+  }
+  if (const SequenceNumber job = conductor.JobOfFiltered(digest); job > 0) return RunAgain(job, digest);
+  for (int attempt = 0; attempt < kMaxRepairsInARow; ++attempt) {
+    const absl::Status remade = conductor.RemakeAccepted(digest);
+    const std::string also = conductor.damaged_blob();
+    if (remade.ok() || also.empty()) return remade;
+    const SequenceNumber job = conductor.JobOfFiltered(also);
+    if (job == 0) return remade;
+    MW_RETURN_IF_ERROR(RunAgain(job, also));
+  }
+  return absl::DataLossError(absl::StrCat("blob ", digest, " is damaged and cannot be made again"));
+}
+
+absl::Status ConductedReconstruction::RunAgain(SequenceNumber sequence, const std::string& digest) {
+  JobStore& store = *environment_.store;
+  while (true) {
+    MW_ASSIGN_OR_RETURN(const CameraJob job, store.GetCameraJob(id_, sequence));
+    if (job.state == CameraJobState::kDone) {
+      const absl::Status there = environment_.blobs->Get(digest).status();
+      if (!IsBlobLost(there)) return there;
+      MW_RETURN_IF_ERROR(store.ReopenCameraJob(id_, sequence, job.epoch, digest,
+                                               absl::StrCat("its surface is damaged or lost (blob ", digest, ")"),
+                                               absl::UnixEpoch(), epoch_));
+      environment_.workers->Wake();
+    } else if (job.failed_attempts >= environment_.retry.max_failures) {
+      return absl::DataLossError(absl::StrCat("surface ", digest, " of camera ", job.camera,
+                                              " is damaged or lost and cannot be made again: ", job.last_failure));
+    }
+    if (!WaitForNews()) return Stopped();
+  }
+}
+
+absl::Status ConductedReconstruction::Join(const Method& method, Conductor& conductor) {
+  MW_RETURN_IF_ERROR(SetState(ReconstructionState::kJoining));
+  if (conductor.AcceptedSurfaces().empty()) {
     return BadInput(absl::FailedPreconditionError(
         absl::StrCat("nothing was reconstructed: no surface was supported by ", method.conductor.acceptance.k_a,
                      " other cameras; are the cameras right, and do the photographs show the same surface?")));
   }
-  MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts,
-                      WriteAcceptedMesh(surfaces, *environment_.blobs, method.join, mesh_path_, *environment_.pool));
-  MW_ASSIGN_OR_RETURN(const FileFacts facts, FactsOf(mesh_path_));
-  return Change([&](ReconstructionRecord& record) {
-    record.state = v1::RECONSTRUCTION_STATE_DONE;
-    record.mesh_bytes = facts.bytes;
-    record.mesh_sha256 = facts.sha256;
-    record.vertices = counts.vertices;
-    record.faces = counts.faces;
-    record.finished = environment_.clock->Now();
-  });
+  MW_ASSIGN_OR_RETURN(const StoredMesh mesh, WriteMesh(method, conductor));
+  const absl::Status finished = environment_.store->FinishReconstruction(id_, mesh, environment_.clock->Now(), epoch_);
+  return absl::IsFailedPrecondition(finished) ? Stopped() : finished;
+}
+
+absl::StatusOr<StoredMesh> ConductedReconstruction::WriteMesh(const Method& method, Conductor& conductor) {
+  const std::string path = absl::StrCat(folders_.data, "/meshes/", id_, "-", epoch_, ".new");
+  absl::StatusOr<JoinedMeshCounts> counts = absl::UnknownError("not tried");
+  for (int attempt = 0; attempt < kMaxRepairsInARow && !counts.ok(); ++attempt) {
+    LostBlobNamer blobs(*environment_.blobs);
+    counts = WriteAcceptedMesh(conductor.AcceptedSurfaces(), blobs, method.join, path, *environment_.pool);
+    if (counts.ok()) break;
+    const std::string lost = LostBlobOf(counts.status());
+    if (lost.empty()) return counts.status();
+    MW_RETURN_IF_ERROR(Repair(conductor, lost));
+  }
+  MW_RETURN_IF_ERROR(counts.status());
+  MW_ASSIGN_OR_RETURN(const FileFacts facts, FactsOf(path));
+  MW_RETURN_IF_ERROR(held_blobs_.PutFile(path, facts.sha256));
+  std::error_code error;
+  fs::rename(path, folders_.MeshFile(facts.sha256), error);
+  return StoredMesh{.digest = facts.sha256, .bytes = facts.bytes, .vertices = counts->vertices, .faces = counts->faces};
 }
 
 }  // namespace meshwright

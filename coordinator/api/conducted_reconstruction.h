@@ -1,14 +1,13 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -18,21 +17,15 @@
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
 #include "common/scene/scene.h"
+#include "coordinator/api/held_blobs.h"
 #include "coordinator/api/method.h"
-#include "coordinator/api/reconstruction_record.h"
+#include "coordinator/api/scene_intake.h"
+#include "coordinator/api/turn_plan.h"
 #include "coordinator/api/worker_logic.h"
 #include "coordinator/conductor/conductor.h"
 #include "coordinator/store/job_store.h"
 
 namespace meshwright {
-
-struct RetryOptions {
-  int max_failures = 3;  // a camera whose job failed so often is set aside, >= 1
-  // Losing workers says little about the camera; but one that takes every worker down must end too. >= 1
-  int max_losses = 30;
-  absl::Duration backoff = absl::Seconds(1);  // before the second attempt; doubles with each
-  absl::Duration max_backoff = absl::Minutes(1);
-};
 
 // What all reconstructions of a coordinator share. Everything outlives them.
 struct ConductingEnvironment {
@@ -45,64 +38,70 @@ struct ConductingEnvironment {
   RetryOptions retry;
 };
 
-// One reconstruction from its scene to its mesh, on a thread of its own, so that acceptance and joining keep nobody
-// waiting. What it knows is in the JobStore; it may end at any moment and another one goes on.
+// Where a coordinator finds and puts files.
+struct CoordinatorFolders {
+  std::string data;                      // uploads on their way, and copies of meshes
+  std::vector<std::string> scene_roots;  // folders that scenes may be taken from by reference
+
+  std::string MeshFile(const std::string& digest) const { return data + "/meshes/" + digest + ".ply"; }
+};
+
+// One reconstruction from its scene to its mesh, or to its end when it is being deleted, on a thread of its own, so
+// that acceptance and joining keep nobody waiting. What it knows is in the JobStore, and what it writes there is fenced
+// by the epoch of its lease: it may end at any moment and another one goes on, here or elsewhere.
 class ConductedReconstruction {
  public:
-  // Changes the record and makes the change durable. False: it was cancelled or deleted meanwhile, stop.
-  using Update = std::function<absl::StatusOr<bool>(const std::function<void(ReconstructionRecord&)>& change)>;
-
-  // `scene_folder`: where the scene is when record.scene_blob is "". `changed` is called when snapshot() may have.
-  ConductedReconstruction(const ConductingEnvironment& environment, const ReconstructionRecord& record,
-                          std::string scene_folder, std::string mesh_path, Update update,
-                          std::function<void()> changed);
+  // `epoch`: of the conductor's lease. `is_deleting`: to be deleted, not conducted. `changed` is called when what the
+  // store says of it may have changed.
+  ConductedReconstruction(const ConductingEnvironment& environment, const CoordinatorFolders& folders, std::string id,
+                          int64_t epoch, bool is_deleting, std::function<void(bool has_ended)> changed);
   // Ends after what it is doing at the moment.
   ~ConductedReconstruction();
 
   void RequestStop();
-
-  struct Snapshot {
-    Progress progress;
-    std::vector<std::pair<CameraIndex, CameraIndex>> pairs;  // (reference, target) of the jobs handed out so far
-  };
-  Snapshot snapshot() const;
+  // There may be results in the store.
+  void Wake();
+  // It has nothing to do any more, for whatever reason; its lease can go.
+  bool has_ended() const { return has_ended_; }
+  int64_t epoch() const { return epoch_; }
+  bool is_deleting() const { return is_deleting_; }
 
  private:
-  struct Attempts {
-    int failures = 0;
-    int losses = 0;
-  };
-
   void Run();
   absl::Status Conduct();
+  absl::Status DeleteEverything();
   absl::Status PrepareScene(const Method& method);
-  absl::Status RunJobs(const Method& method, Conductor& conductor);
-  void OfferJobs(const Method& method, Conductor& conductor);
-  absl::Status Handle(const Method& method, Conductor& conductor, const JobOutcome& outcome);
-  absl::Status TryAgain(const Method& method, const JobOutcome& outcome, absl::Duration delay);
-  absl::Status Join(const Method& method, const Conductor& conductor);
-  absl::Status Change(const std::function<void(ReconstructionRecord&)>& change);
-  bool WaitForOutcome(JobOutcome& outcome);
-  void PublishProgress(const Conductor& conductor);
+  absl::StatusOr<TakenScene> Take();
+  absl::StatusOr<std::string> SceneFolder(bool* is_temporary);
+  absl::StatusOr<std::unique_ptr<Conductor>> OpenConductor(const Method& method);
+  absl::Status RunJobs(Conductor& conductor);
+  absl::Status Join(const Method& method, Conductor& conductor);
+  absl::StatusOr<StoredMesh> WriteMesh(const Method& method, Conductor& conductor);
+  absl::Status LookAtReports(Conductor& conductor);
+  absl::Status Repair(Conductor& conductor, const std::string& digest);
+  absl::Status RunAgain(SequenceNumber sequence, const std::string& digest);
+  absl::Status SetState(ReconstructionState state, const std::string& reason = "");
+  bool WaitForNews();
 
   const ConductingEnvironment environment_;
-  ReconstructionRecord record_;
-  const std::string scene_folder_;
-  const std::string mesh_path_;
-  const Update update_;
-  const std::function<void()> changed_;
+  const CoordinatorFolders folders_;
+  const std::string id_;
+  const int64_t epoch_;
+  const bool is_deleting_;
+  const std::function<void(bool has_ended)> changed_;
 
   // Of the thread alone.
+  Reconstruction record_;
+  HeldBlobs held_blobs_;
   std::vector<Camera> cameras_;
   std::vector<SparsePoint> points_;
-  std::map<SequenceNumber, CameraJobSpec> handed_out_;
-  std::map<SequenceNumber, Attempts> attempts_;
+  std::map<std::string, std::string> photographs_;  // digest -> name
 
+  std::atomic<bool> has_ended_{false};
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  std::deque<JobOutcome> outcomes_;
+  bool has_news_ = false;
   bool stopping_ = false;
-  Snapshot snapshot_;
   std::thread thread_;
 };
 

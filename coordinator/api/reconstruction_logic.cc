@@ -18,26 +18,22 @@ namespace fs = std::filesystem;
 
 constexpr int kDefaultPageSize = 100;
 constexpr int kMaxPageSize = 1000;
+constexpr double kMinWeight = 0.001;
 constexpr double kMaxWeight = 1000;
 constexpr std::chrono::milliseconds kLookAgain(500);
 
-void FillTime(absl::Time time, google::protobuf::Timestamp& timestamp) {
-  const int64_t microseconds = absl::ToUnixMicros(time);
-  timestamp.set_seconds(microseconds / 1'000'000);
-  timestamp.set_nanos(static_cast<int32_t>(microseconds % 1'000'000) * 1000);
+constexpr int kDefaultAttempts = 1000;
+constexpr int kMaxAttempts = 100'000;
+// The overseer looks so often in the time of a lease.
+constexpr int kLooksPerLease = 4;
+
+absl::Status WrongState(const Reconstruction& stored, const char* expected) {
+  return absl::FailedPreconditionError(absl::StrCat("reconstruction ", stored.id, " is ",
+                                                    v1::ReconstructionState_Name(ToProto(stored.state)), ", expected ",
+                                                    expected));
 }
 
-bool IsConducted(v1::ReconstructionState state) {
-  return state == v1::RECONSTRUCTION_STATE_PREPARING || state == v1::RECONSTRUCTION_STATE_RUNNING ||
-         state == v1::RECONSTRUCTION_STATE_JOINING;
-}
-
-absl::Status WrongState(const ReconstructionRecord& record, const char* expected) {
-  return absl::FailedPreconditionError(absl::StrCat(
-      "reconstruction ", record.id, " is ", v1::ReconstructionState_Name(record.state), ", expected ", expected));
-}
-
-v1::CameraState ToProto(CameraJobState state, bool committed) {
+v1::CameraState CameraStateOf(CameraJobState state, bool committed) {
   if (state == CameraJobState::kSetAside) return v1::CAMERA_STATE_SET_ASIDE;
   if (committed) return v1::CAMERA_STATE_COMMITTED;
   return state == CameraJobState::kDone ? v1::CAMERA_STATE_DONE : v1::CAMERA_STATE_ASSIGNED;
@@ -51,12 +47,13 @@ bool IsOver(v1::ReconstructionState state) {
 }
 
 ReconstructionLogic::ReconstructionLogic(const ReconstructionLogicOptions& options,
-                                         const ConductingEnvironment& environment, RecordFolder records)
-    : options_(options), environment_(environment), records_(std::move(records)) {}
+                                         const ConductingEnvironment& environment)
+    : options_(options),
+      folders_{.data = options.data_folder, .scene_roots = options.scene_roots},
+      environment_(environment) {}
 
 absl::StatusOr<std::unique_ptr<ReconstructionLogic>> ReconstructionLogic::Open(
     const ReconstructionLogicOptions& options, const ConductingEnvironment& environment) {
-  MW_ASSIGN_OR_RETURN(RecordFolder records, RecordFolder::Open(absl::StrCat(options.data_folder, "/reconstructions")));
   for (const char* folder : {"uploads", "meshes"}) {
     std::error_code error;
     fs::create_directories(fs::path(options.data_folder) / folder, error);
@@ -65,178 +62,217 @@ absl::StatusOr<std::unique_ptr<ReconstructionLogic>> ReconstructionLogic::Open(
           absl::StrCat(options.data_folder, "/", folder, ": cannot make the folder: ", error.message()));
     }
   }
-  MW_ASSIGN_OR_RETURN(std::vector<ReconstructionRecord> loaded, records.LoadAll());
-  auto logic = std::unique_ptr<ReconstructionLogic>(new ReconstructionLogic(options, environment, std::move(records)));
-  const std::lock_guard<std::mutex> lock(logic->mutex_);
-  for (ReconstructionRecord& record : loaded) {
-    Entry& entry = logic->entries_[record.id];
-    entry.record = std::move(record);
-    if (!entry.record.deleted && IsConducted(entry.record.state)) logic->Conduct(entry);
-  }
+  auto logic = std::unique_ptr<ReconstructionLogic>(new ReconstructionLogic(options, environment));
+  environment.workers->SetListener([raw = logic.get()](const std::string& id) {
+    const std::lock_guard<std::mutex> lock(raw->mutex_);
+    const auto found = raw->conducted_.find(id);
+    if (found != raw->conducted_.end()) found->second->Wake();
+  });
+  logic->overseer_ = std::thread([raw = logic.get()] { raw->Oversee(); });
   return logic;
 }
 
 ReconstructionLogic::~ReconstructionLogic() {
   Shutdown();
-  std::vector<std::unique_ptr<ConductedReconstruction>> conducted;
+  environment_.workers->SetListener(nullptr);
+  overseer_.join();
+  // All end at the same time; then others may take over at once.
+  for (auto& [id, conducted] : conducted_) conducted->RequestStop();
+  const absl::Time now = environment_.store->Now().value_or(environment_.clock->Now());
+  for (auto& [id, conducted] : conducted_) {
+    const int64_t epoch = conducted->epoch();
+    conducted.reset();
+    environment_.store->ReleaseConductorLease(id, epoch, now).IgnoreError();
+  }
+}
+
+void ReconstructionLogic::Changed(bool look) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    for (auto& [id, entry] : entries_) {
-      if (entry.conducted == nullptr) continue;
-      entry.conducted->RequestStop();
-      conducted.push_back(std::move(entry.conducted));
+    ++version_;
+    look_ = look_ || look;
+  }
+  changed_.notify_all();
+  if (look) overseer_wake_.notify_all();
+}
+
+void ReconstructionLogic::Oversee() {
+  const auto every = absl::ToChronoMilliseconds(options_.conductor_lease / kLooksPerLease);
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!stopping_) {
+    look_ = false;
+    lock.unlock();
+    // A store that is away comes back, or everything else fails too.
+    OverseeOnce().IgnoreError();
+    lock.lock();
+    overseer_wake_.wait_for(lock, every, [&] { return stopping_ || look_; });
+  }
+}
+
+absl::Status ReconstructionLogic::OverseeOnce() {
+  MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
+  MW_ASSIGN_OR_RETURN(const std::vector<ConductedState> all, environment_.store->ListConducted());
+  std::map<std::string, const ConductedState*> by_id;
+  for (const ConductedState& state : all) by_id[state.id] = &state;
+  std::vector<std::unique_ptr<ConductedReconstruction>> ended;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (auto it = conducted_.begin(); it != conducted_.end();) {
+      ConductedReconstruction& conducted = *it->second;
+      const auto found = by_id.find(it->first);
+      const bool is_ours = found != by_id.end() && found->second->lease.epoch == conducted.epoch();
+      if (!is_ours) conducted.RequestStop();  // cancelled, or somebody else's now
+      if (conducted.has_ended()) {
+        ended.push_back(std::move(it->second));
+        it = conducted_.erase(it);
+      } else {
+        ++it;
+      }
     }
   }
+  ended.clear();
+  for (const ConductedState& state : all) MW_RETURN_IF_ERROR(TakeUp(state, now));
+  return absl::OkStatus();
 }
 
-std::string ReconstructionLogic::UploadFolder(const std::string& id) const {
-  return absl::StrCat(options_.data_folder, "/uploads/", id);
-}
-
-std::string ReconstructionLogic::MeshFile(const std::string& id) const {
-  return absl::StrCat(options_.data_folder, "/meshes/", id, ".ply");
-}
-
-absl::StatusOr<ReconstructionLogic::Entry*> ReconstructionLogic::Find(const std::string& id) const {
-  const auto found = entries_.find(id);
-  if (found == entries_.end() || found->second.record.deleted) {
-    return absl::NotFoundError(absl::StrCat("there is no reconstruction \"", id.substr(0, 64), "\""));
+absl::Status ReconstructionLogic::TakeUp(const ConductedState& state, absl::Time now) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = conducted_.find(state.id);
+    if (found != conducted_.end()) {
+      ConductedReconstruction& conducted = *found->second;
+      // What was run before it was deleted has to end first.
+      if (state.state == ReconstructionState::kDeleting && !conducted.is_deleting()) conducted.RequestStop();
+      const bool is_ours = state.lease.epoch == conducted.epoch();
+      if (!is_ours || state.lease.expires_at - now > options_.conductor_lease / 2) return absl::OkStatus();
+    } else if (state.lease.epoch > 0 && state.lease.expires_at > now && state.lease.owner != options_.name) {
+      return absl::OkStatus();
+    }
   }
-  return &found->second;
+  const absl::Time until = now + options_.conductor_lease;
+  const auto is_conducted = [&] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return conducted_.count(state.id) > 0;
+  };
+  if (is_conducted()) {
+    const absl::Status renewed = environment_.store->RenewConductorLease(state.id, state.lease.epoch, until, now);
+    return absl::IsAborted(renewed) ? absl::OkStatus() : renewed;
+  }
+  const absl::StatusOr<int64_t> epoch = environment_.store->AcquireConductorLease(state.id, options_.name, until, now);
+  // Another coordinator was quicker, or it is gone.
+  if (absl::IsFailedPrecondition(epoch.status()) || absl::IsNotFound(epoch.status())) return absl::OkStatus();
+  MW_RETURN_IF_ERROR(epoch.status());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  conducted_[state.id] = std::make_unique<ConductedReconstruction>(environment_, folders_, state.id, *epoch,
+                                                                   state.state == ReconstructionState::kDeleting,
+                                                                   [this](bool has_ended) { Changed(has_ended); });
+  return absl::OkStatus();
 }
 
-v1::Reconstruction ReconstructionLogic::ToProto(const Entry& entry) const {
-  const ReconstructionRecord& record = entry.record;
-  v1::Reconstruction reconstruction;
-  reconstruction.set_id(record.id);
-  reconstruction.set_state(record.state);
-  reconstruction.set_failure(record.failure);
-  reconstruction.set_options_json(record.options_json);
-  reconstruction.set_scene_reference(record.scene_reference);
-  reconstruction.set_weight(record.weight);
-  FillTime(record.created, *reconstruction.mutable_create_time());
-  if (record.finished != absl::InfinitePast()) FillTime(record.finished, *reconstruction.mutable_finish_time());
-  reconstruction.set_mesh_bytes(record.mesh_bytes);
-  reconstruction.set_mesh_sha256(record.mesh_sha256);
-  v1::Progress& progress = *reconstruction.mutable_progress();
-  progress.set_vertices(record.vertices);
-  progress.set_faces(record.faces);
-  if (entry.conducted != nullptr) {
-    const Progress conducted = entry.conducted->snapshot().progress;
-    progress.set_cameras_total(conducted.cameras_total);
-    progress.set_cameras_committed(conducted.cameras_committed);
-    progress.set_cameras_set_aside(conducted.cameras_set_aside);
-    progress.set_cameras_in_flight(conducted.cameras_in_flight);
-    progress.set_patches_filtered(conducted.patches_filtered);
-    progress.set_patches_accepted(conducted.patches_accepted);
-    progress.set_jobs_leased(environment_.workers->LeasesIn(record.id));
+void ReconstructionLogic::StopConducting(const std::string& id) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = conducted_.find(id);
+    if (found != conducted_.end()) found->second->RequestStop();
+  }
+  environment_.workers->Wake();
+  Changed(/*look=*/true);
+}
+
+absl::StatusOr<Reconstruction> ReconstructionLogic::Find(const std::string& id) const {
+  const auto none = [&] {
+    return absl::NotFoundError(absl::StrCat("there is no reconstruction \"", id.substr(0, 64), "\""));
+  };
+  if (!ValidateReconstructionId(id).ok()) return none();
+  absl::StatusOr<Reconstruction> stored = environment_.store->GetReconstruction(id);
+  if (absl::IsNotFound(stored.status())) return none();
+  if (stored.ok() && stored->state == ReconstructionState::kDeleting) return none();
+  return stored;
+}
+
+v1::Reconstruction ReconstructionLogic::Describe(const Reconstruction& stored) const {
+  v1::Reconstruction reconstruction = ToProto(stored);
+  if (IsFinal(stored.state)) return reconstruction;
+  reconstruction.mutable_progress()->set_jobs_leased(environment_.workers->LeasesIn(stored.id));
+  for (std::string& warning : environment_.workers->WarningsFor(stored.id)) {
+    reconstruction.add_warnings(std::move(warning));
   }
   return reconstruction;
 }
 
-void ReconstructionLogic::Conduct(Entry& entry) {
-  const std::string id = entry.record.id;
-  std::string scene_folder = UploadFolder(id);
-  if (!entry.record.scene_reference.empty()) {
-    // One that is gone meanwhile fails as any scene that is not there.
-    scene_folder = ResolveSceneReference(entry.record.scene_reference, options_.scene_roots)
-                       .value_or(entry.record.scene_reference);
-  }
-  entry.conducted = std::make_unique<ConductedReconstruction>(
-      environment_, entry.record, scene_folder, MeshFile(id),
-      [this, id](const std::function<void(ReconstructionRecord&)>& change) { return Update(id, change); },
-      [this, id] { Touch(id); });
-}
-
-absl::StatusOr<bool> ReconstructionLogic::Update(const std::string& id,
-                                                 const std::function<void(ReconstructionRecord&)>& change) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    Entry& entry = entries_.at(id);
-    if (entry.record.deleted || IsOver(entry.record.state)) return false;
-    ReconstructionRecord changed = entry.record;
-    change(changed);
-    MW_RETURN_IF_ERROR(records_.Save(changed));
-    entry.record = std::move(changed);
-    ++entry.version;
-  }
-  changed_.notify_all();
-  return true;
-}
-
-void ReconstructionLogic::Touch(const std::string& id) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++entries_.at(id).version;
-  }
-  changed_.notify_all();
-}
-
 absl::StatusOr<v1::Reconstruction> ReconstructionLogic::Create(const v1::CreateReconstructionRequest& request) {
   MW_RETURN_IF_ERROR(ValidateReconstructionId(request.id()));
-  if (!(request.weight() >= 0 && request.weight() <= kMaxWeight)) {
-    return absl::InvalidArgumentError(absl::StrCat("weight is ", request.weight(), ", expected 0..", kMaxWeight));
+  const double weight = request.weight() == 0 ? 1 : request.weight();
+  if (!(weight >= kMinWeight && weight <= kMaxWeight)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("weight is ", request.weight(), ", expected ", kMinWeight, "..", kMaxWeight, ", or 0 for 1"));
   }
   MW_ASSIGN_OR_RETURN(const Method method, environment_.parse_method(request.options_json()));
   if (!request.scene_reference().empty()) {
     MW_RETURN_IF_ERROR(ResolveSceneReference(request.scene_reference(), options_.scene_roots).status());
   }
-  const ReconstructionRecord record = {.id = request.id(),
-                                       .options_json = method.options_json,
-                                       .scene_reference = request.scene_reference(),
-                                       .weight = request.weight() > 0 ? request.weight() : 1,
-                                       .created = environment_.clock->Now()};
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const auto found = entries_.find(record.id);
-  if (found != entries_.end()) {
-    const ReconstructionRecord& before = found->second.record;
-    if (!before.deleted && before.options_json == record.options_json &&
-        before.scene_reference == record.scene_reference && before.weight == record.weight) {
-      return ToProto(found->second);
-    }
+  const Reconstruction wanted = {.id = request.id(),
+                                 .options_json = method.options_json,
+                                 .state = ReconstructionState::kCreated,
+                                 .weight = std::round(weight / kMinWeight) * kMinWeight,
+                                 .scene_reference = request.scene_reference()};
+  MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
+  const absl::Status created = environment_.store->CreateReconstruction(wanted, now);
+  if (!created.ok() && !absl::IsAlreadyExists(created)) return created;
+  const absl::StatusOr<Reconstruction> stored = Find(wanted.id);
+  if (absl::IsNotFound(stored.status())) {
     return absl::AlreadyExistsError(
-        absl::StrCat("id \"", record.id, "\" is that of ",
-                     before.deleted ? "a reconstruction that was deleted" : "another reconstruction"));
+        absl::StrCat("id \"", wanted.id, "\" is that of a reconstruction that was deleted"));
   }
-  MW_RETURN_IF_ERROR(records_.Save(record));
-  Entry& entry = entries_[record.id];
-  entry.record = record;
-  return ToProto(entry);
+  MW_RETURN_IF_ERROR(stored.status());
+  if (stored->options_json != wanted.options_json || stored->scene_reference != wanted.scene_reference ||
+      std::abs(stored->weight - wanted.weight) > kMinWeight / 2) {
+    return absl::AlreadyExistsError(absl::StrCat("id \"", wanted.id, "\" is that of another reconstruction"));
+  }
+  return Describe(*stored);
 }
 
 absl::StatusOr<SceneFileUpload> ReconstructionLogic::BeginUpload(const v1::UploadSceneFileRequest::Header& header) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    MW_ASSIGN_OR_RETURN(const Entry* const entry, Find(header.reconstruction_id()));
-    if (entry->record.state != v1::RECONSTRUCTION_STATE_CREATED) return WrongState(entry->record, "one not started");
-    if (!entry->record.scene_reference.empty()) {
-      return absl::FailedPreconditionError(
-          absl::StrCat("reconstruction ", entry->record.id, " has a scene_reference; nothing is uploaded to it"));
-    }
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, Find(header.reconstruction_id()));
+  if (stored.state != ReconstructionState::kCreated) return WrongState(stored, "one not started");
+  if (!stored.scene_reference.empty()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("reconstruction ", stored.id, " has a scene_reference; nothing is uploaded to it"));
   }
-  return SceneFileUpload::Begin(UploadFolder(header.reconstruction_id()), header.path(), header.size_bytes(),
-                                header.sha256());
+  return SceneFileUpload::Begin(
+      absl::StrCat(options_.data_folder, "/uploads"), header.path(), header.size_bytes(), header.sha256(),
+      [this, header](const std::string& local_path) { return KeepUpload(header, local_path); });
+}
+
+absl::Status ReconstructionLogic::KeepUpload(const v1::UploadSceneFileRequest::Header& header,
+                                             const std::string& local_path) {
+  HeldBlobs blobs(header.reconstruction_id(), *environment_.store, *environment_.blobs);
+  MW_RETURN_IF_ERROR(blobs.PutFile(local_path, header.sha256()));
+  return environment_.store->PutSceneFile(
+      header.reconstruction_id(),
+      {.path = header.path(), .size_bytes = header.size_bytes(), .digest = header.sha256()});
+}
+
+absl::StatusOr<std::vector<SceneFile>> ReconstructionLogic::ListSceneFiles(const std::string& id) const {
+  MW_RETURN_IF_ERROR(Find(id).status());
+  return environment_.store->ListSceneFiles(id);
 }
 
 absl::StatusOr<v1::Reconstruction> ReconstructionLogic::Start(const std::string& id) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  MW_ASSIGN_OR_RETURN(Entry* const entry, Find(id));
-  if (entry->record.state == v1::RECONSTRUCTION_STATE_CREATED) {
-    ReconstructionRecord started = entry->record;
-    started.state = v1::RECONSTRUCTION_STATE_PREPARING;
-    MW_RETURN_IF_ERROR(records_.Save(started));
-    entry->record = std::move(started);
-    ++entry->version;
-    Conduct(*entry);
+  MW_ASSIGN_OR_RETURN(Reconstruction stored, Find(id));
+  if (stored.state == ReconstructionState::kCreated) {
+    MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
+    MW_RETURN_IF_ERROR(environment_.store->SetReconstructionState(id, ReconstructionState::kPreparing, now));
+    Changed(/*look=*/true);
+    MW_ASSIGN_OR_RETURN(stored, Find(id));
   }
-  if (entry->record.state == v1::RECONSTRUCTION_STATE_CANCELLED) return WrongState(entry->record, "one not cancelled");
-  return ToProto(*entry);
+  if (stored.state == ReconstructionState::kCancelled) return WrongState(stored, "one not cancelled");
+  return Describe(stored);
 }
 
 absl::StatusOr<v1::Reconstruction> ReconstructionLogic::Get(const std::string& id) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  MW_ASSIGN_OR_RETURN(const Entry* const entry, Find(id));
-  return ToProto(*entry);
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, Find(id));
+  return Describe(stored);
 }
 
 absl::StatusOr<v1::ListReconstructionsResponse> ReconstructionLogic::List(
@@ -246,66 +282,51 @@ absl::StatusOr<v1::ListReconstructionsResponse> ReconstructionLogic::List(
         absl::StrCat("page_size is ", request.page_size(), ", expected 0..", kMaxPageSize));
   }
   const int page_size = request.page_size() > 0 ? request.page_size() : kDefaultPageSize;
-  v1::ListReconstructionsResponse response;
-  const std::lock_guard<std::mutex> lock(mutex_);
   // A page's token is the last id of the page before.
-  for (auto it = entries_.upper_bound(request.page_token()); it != entries_.end(); ++it) {
-    if (it->second.record.deleted) continue;
+  if (!request.page_token().empty() && !ValidateReconstructionId(request.page_token()).ok()) {
+    return absl::InvalidArgumentError("page_token: expected what the page before said");
+  }
+  MW_ASSIGN_OR_RETURN(const std::vector<Reconstruction> page,
+                      environment_.store->ListReconstructions(request.page_token(), page_size + 1));
+  v1::ListReconstructionsResponse response;
+  for (const Reconstruction& stored : page) {
     if (response.reconstructions_size() == page_size) {
       response.set_next_page_token(response.reconstructions(page_size - 1).id());
       break;
     }
-    *response.add_reconstructions() = ToProto(it->second);
+    *response.add_reconstructions() = Describe(stored);
   }
   return response;
 }
 
-absl::Status ReconstructionLogic::StopEntry(Entry& entry, const std::function<void(ReconstructionRecord&)>& change) {
-  ReconstructionRecord changed = entry.record;
-  change(changed);
-  MW_RETURN_IF_ERROR(records_.Save(changed));
-  entry.record = std::move(changed);
-  ++entry.version;
-  if (entry.conducted != nullptr) {
-    entry.conducted->RequestStop();
-    environment_.workers->RemoveReconstruction(entry.record.id);
-  }
-  return absl::OkStatus();
-}
-
 absl::StatusOr<v1::Reconstruction> ReconstructionLogic::Cancel(const std::string& id) {
-  const std::unique_lock<std::mutex> lock(mutex_);
-  MW_ASSIGN_OR_RETURN(Entry* const entry, Find(id));
-  if (!IsOver(entry->record.state)) {
-    MW_RETURN_IF_ERROR(StopEntry(*entry, [&](ReconstructionRecord& record) {
-      record.state = v1::RECONSTRUCTION_STATE_CANCELLED;
-      record.finished = environment_.clock->Now();
-    }));
+  MW_ASSIGN_OR_RETURN(Reconstruction stored, Find(id));
+  if (!IsFinal(stored.state)) {
+    MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
+    const absl::Status cancelled = environment_.store->SetReconstructionState(id, ReconstructionState::kCancelled, now);
+    // It may have come to its end at the same moment.
+    if (!absl::IsFailedPrecondition(cancelled)) MW_RETURN_IF_ERROR(cancelled);
+    StopConducting(id);
+    MW_ASSIGN_OR_RETURN(stored, Find(id));
   }
-  changed_.notify_all();
-  return ToProto(*entry);
+  return Describe(stored);
 }
 
 absl::Status ReconstructionLogic::Delete(const std::string& id) {
-  const std::unique_lock<std::mutex> lock(mutex_);
-  MW_ASSIGN_OR_RETURN(Entry* const entry, Find(id));
-  MW_RETURN_IF_ERROR(StopEntry(*entry, [](ReconstructionRecord& record) { record.deleted = true; }));
-  std::error_code error;
-  fs::remove(MeshFile(id), error);
-  fs::remove_all(UploadFolder(id), error);
-  changed_.notify_all();
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, Find(id));
+  MW_RETURN_IF_ERROR(environment_.store->BeginDeletion(id));
+  if (!stored.mesh.digest.empty()) {
+    std::error_code error;
+    fs::remove(folders_.MeshFile(stored.mesh.digest), error);
+  }
+  StopConducting(id);
   return absl::OkStatus();
 }
 
 absl::StatusOr<Scene> ReconstructionLogic::LoadScene(const std::string& id) const {
-  std::string scene_blob;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    MW_ASSIGN_OR_RETURN(const Entry* const entry, Find(id));
-    if (entry->record.scene_blob.empty()) return WrongState(entry->record, "one whose scene has been checked");
-    scene_blob = entry->record.scene_blob;
-  }
-  MW_ASSIGN_OR_RETURN(const std::string bytes, environment_.blobs->Get(scene_blob));
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, Find(id));
+  if (stored.scene_blob.empty()) return WrongState(stored, "one whose scene has been checked");
+  MW_ASSIGN_OR_RETURN(const std::string bytes, environment_.blobs->Get(stored.scene_blob));
   return DecodeScene(bytes);
 }
 
@@ -327,10 +348,15 @@ absl::StatusOr<v1::ListCamerasResponse> ReconstructionLogic::ListCameras(const s
     if (job.camera < 0 || job.camera >= response.cameras_size()) continue;
     v1::Camera& camera = *response.mutable_cameras(job.camera);
     const bool committed = static_cast<size_t>(job.sequence) <= commits.size();
-    camera.set_state(meshwright::ToProto(job.state, committed));
+    camera.set_state(CameraStateOf(job.state, committed));
     camera.set_sequence(job.sequence);
     camera.set_set_aside_reason(job.set_aside_reason);
     camera.set_report_json(job.report_json);
+    camera.set_failed_attempts(static_cast<int32_t>(job.failed_attempts));
+    camera.set_last_failure(job.last_failure);
+    camera.set_reduction(static_cast<int32_t>(job.reduction));
+    camera.set_worker(job.lease_worker);
+    camera.set_memory_bytes(job.memory_bytes);
     if (!committed) continue;
     const Commit& commit = commits[static_cast<size_t>(job.sequence) - 1];
     camera.set_filtered_patches(commit.filtered_patches);
@@ -340,26 +366,42 @@ absl::StatusOr<v1::ListCamerasResponse> ReconstructionLogic::ListCameras(const s
 }
 
 absl::StatusOr<v1::GetIncidenceResponse> ReconstructionLogic::GetIncidence(const std::string& id) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  MW_ASSIGN_OR_RETURN(const Entry* const entry, Find(id));
+  MW_RETURN_IF_ERROR(Find(id).status());
+  MW_ASSIGN_OR_RETURN(const std::vector<CameraJob> jobs, environment_.store->ListCameraJobs(id));
   v1::GetIncidenceResponse response;
-  if (entry->conducted == nullptr) return response;
-  for (const auto& [reference, target] : entry->conducted->snapshot().pairs) {
-    v1::IncidencePair& pair = *response.add_pairs();
-    pair.set_reference(reference);
-    pair.set_target(target);
+  for (const CameraJob& job : jobs) {
+    for (const CameraIndex target : job.neighbours) {
+      v1::IncidencePair& pair = *response.add_pairs();
+      pair.set_reference(job.camera);
+      pair.set_target(target);
+    }
+  }
+  return response;
+}
+
+absl::StatusOr<v1::ListAttemptsResponse> ReconstructionLogic::ListAttempts(
+    const v1::ListAttemptsRequest& request) const {
+  if (request.max_attempts() < 0 || request.max_attempts() > kMaxAttempts) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("max_attempts is ", request.max_attempts(), ", expected 0..", kMaxAttempts));
+  }
+  const int limit = request.max_attempts() > 0 ? request.max_attempts() : kDefaultAttempts;
+  MW_RETURN_IF_ERROR(Find(request.id()).status());
+  v1::ListAttemptsResponse response;
+  for (v1::Attempt& attempt : environment_.workers->RunningIn(request.id())) {
+    if (response.attempts_size() < limit) *response.add_attempts() = std::move(attempt);
+  }
+  MW_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, environment_.store->ListAttempts(request.id(), limit));
+  for (const Attempt& attempt : attempts) {
+    if (response.attempts_size() < limit) *response.add_attempts() = ToProto(request.id(), attempt);
   }
   return response;
 }
 
 absl::StatusOr<v1::ListPartsResponse> ReconstructionLogic::ListParts(const std::string& id) const {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    MW_RETURN_IF_ERROR(Find(id).status());
-  }
+  MW_RETURN_IF_ERROR(Find(id).status());
   v1::ListPartsResponse response;
   const absl::StatusOr<std::vector<Commit>> commits = environment_.store->ListCommits(id);
-  if (absl::IsNotFound(commits.status())) return response;  // not begun
   MW_RETURN_IF_ERROR(commits.status());
   for (const Commit& commit : *commits) {
     if (commit.accepted_digest.empty()) continue;
@@ -373,10 +415,12 @@ absl::StatusOr<v1::ListPartsResponse> ReconstructionLogic::ListParts(const std::
 }
 
 absl::StatusOr<std::string> ReconstructionLogic::MeshPath(const std::string& id) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  MW_ASSIGN_OR_RETURN(const Entry* const entry, Find(id));
-  if (entry->record.state != v1::RECONSTRUCTION_STATE_DONE) return WrongState(entry->record, "one that is done");
-  return MeshFile(id);
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, Find(id));
+  if (stored.state != ReconstructionState::kDone) return WrongState(stored, "one that is done");
+  const std::string path = folders_.MeshFile(stored.mesh.digest);
+  std::error_code error;
+  if (!fs::exists(path, error)) MW_RETURN_IF_ERROR(environment_.blobs->GetFile(stored.mesh.digest, path));
+  return path;
 }
 
 absl::StatusOr<std::string> ReconstructionLogic::PartBytes(const std::string& id, int32_t sequence) const {
@@ -389,21 +433,23 @@ absl::StatusOr<std::string> ReconstructionLogic::PartBytes(const std::string& id
 
 absl::Status ReconstructionLogic::Watch(const std::string& id,
                                         const std::function<bool(const v1::Reconstruction&)>& send) {
-  int64_t told = -1;
-  std::unique_lock<std::mutex> lock(mutex_);
+  std::string told;
   while (true) {
-    MW_ASSIGN_OR_RETURN(const Entry* const entry, Find(id));
-    if (stopping_) return absl::UnavailableError("the coordinator is going down");
-    if (entry->version == told) {
-      changed_.wait_for(lock, kLookAgain);
-      continue;
+    int64_t version = 0;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (stopping_) return absl::UnavailableError("the coordinator is going down");
+      version = version_;
     }
-    told = entry->version;
-    const v1::Reconstruction reconstruction = ToProto(*entry);
-    lock.unlock();
-    if (!send(reconstruction)) return absl::CancelledError("nobody watches any more");
-    if (IsOver(reconstruction.state())) return absl::OkStatus();
-    lock.lock();
+    MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, Get(id));
+    if (std::string now = reconstruction.SerializeAsString(); now != told) {
+      if (!send(reconstruction)) return absl::CancelledError("nobody watches any more");
+      if (IsOver(reconstruction.state())) return absl::OkStatus();
+      told = std::move(now);
+    }
+    std::unique_lock<std::mutex> lock(mutex_);
+    // Other coordinators change things too.
+    changed_.wait_for(lock, kLookAgain, [&] { return stopping_ || version_ != version; });
   }
 }
 
@@ -413,6 +459,7 @@ void ReconstructionLogic::Shutdown() {
     stopping_ = true;
   }
   changed_.notify_all();
+  overseer_wake_.notify_all();
 }
 
 }  // namespace meshwright

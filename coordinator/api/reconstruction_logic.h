@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -14,19 +15,26 @@
 #include "meshwright/v1/reconstruction.pb.h"
 
 #include "coordinator/api/conducted_reconstruction.h"
+#include "coordinator/api/reconstruction_record.h"
 #include "coordinator/api/scene_intake.h"
 
 namespace meshwright {
 
 struct ReconstructionLogicOptions {
-  std::string data_folder;               // records, uploads and meshes
+  std::string data_folder;               // uploads on their way, copies of meshes
   std::vector<std::string> scene_roots;  // folders that scenes may be taken from by reference
+  // Names this coordinator among those that share the store: the same when it is started anew, so that it takes back
+  // what it conducted at once.
+  std::string name = "coordinator";
+  // Another coordinator takes over what this one conducts when it has been silent so long.
+  absl::Duration conductor_lease = absl::Seconds(5);
 };
 
-// The public interface without a network. Thread-safe. Errors are as reconstruction.proto says.
+// The public interface without a network. All that it knows is in the JobStore and the BlobStore, so any coordinator
+// answers any call; a thread takes up reconstructions that nobody conducts. Thread-safe. Errors are as
+// reconstruction.proto says.
 class ReconstructionLogic {
  public:
-  // Goes on with every reconstruction that was not finished.
   static absl::StatusOr<std::unique_ptr<ReconstructionLogic>> Open(const ReconstructionLogicOptions& options,
                                                                    const ConductingEnvironment& environment);
   // Ends all of them after what they are doing at the moment.
@@ -34,6 +42,8 @@ class ReconstructionLogic {
 
   absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request);
   absl::StatusOr<SceneFileUpload> BeginUpload(const v1::UploadSceneFileRequest::Header& header);
+  // What has been uploaded so far, by path.
+  absl::StatusOr<std::vector<SceneFile>> ListSceneFiles(const std::string& id) const;
   absl::StatusOr<v1::Reconstruction> Start(const std::string& id);
   absl::StatusOr<v1::Reconstruction> Get(const std::string& id) const;
   absl::StatusOr<v1::ListReconstructionsResponse> List(const v1::ListReconstructionsRequest& request) const;
@@ -45,7 +55,8 @@ class ReconstructionLogic {
   absl::StatusOr<Scene> LoadScene(const std::string& id) const;
   absl::StatusOr<v1::GetIncidenceResponse> GetIncidence(const std::string& id) const;
   absl::StatusOr<v1::ListPartsResponse> ListParts(const std::string& id) const;
-  // The file to be read, there as long as the reconstruction is not deleted.
+  absl::StatusOr<v1::ListAttemptsResponse> ListAttempts(const v1::ListAttemptsRequest& request) const;
+  // The file to be read: this coordinator's copy of the mesh, there as long as the reconstruction is not deleted.
   absl::StatusOr<std::string> MeshPath(const std::string& id) const;
   absl::StatusOr<std::string> PartBytes(const std::string& id, int32_t sequence) const;
 
@@ -55,31 +66,28 @@ class ReconstructionLogic {
   void Shutdown();
 
  private:
-  struct Entry {
-    ReconstructionRecord record;
-    std::unique_ptr<ConductedReconstruction> conducted;  // null when it does not run
-    int64_t version = 0;
-  };
+  ReconstructionLogic(const ReconstructionLogicOptions& options, const ConductingEnvironment& environment);
 
-  ReconstructionLogic(const ReconstructionLogicOptions& options, const ConductingEnvironment& environment,
-                      RecordFolder records);
-
-  absl::StatusOr<Entry*> Find(const std::string& id) const;  // needs the lock
-  v1::Reconstruction ToProto(const Entry& entry) const;
-  void Conduct(Entry& entry);
-  absl::StatusOr<bool> Update(const std::string& id, const std::function<void(ReconstructionRecord&)>& change);
-  absl::Status StopEntry(Entry& entry, const std::function<void(ReconstructionRecord&)>& change);
-  std::string UploadFolder(const std::string& id) const;
-  std::string MeshFile(const std::string& id) const;
-  void Touch(const std::string& id);
+  absl::StatusOr<Reconstruction> Find(const std::string& id) const;
+  v1::Reconstruction Describe(const Reconstruction& reconstruction) const;
+  absl::Status KeepUpload(const v1::UploadSceneFileRequest::Header& header, const std::string& local_path);
+  void StopConducting(const std::string& id);
+  void Changed(bool look);
+  void Oversee();
+  absl::Status OverseeOnce();
+  absl::Status TakeUp(const ConductedState& state, absl::Time now);
 
   const ReconstructionLogicOptions options_;
+  const CoordinatorFolders folders_;
   const ConductingEnvironment environment_;
-  const RecordFolder records_;
   mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  mutable std::map<std::string, Entry> entries_;
+  mutable std::condition_variable changed_;
+  int64_t version_ = 0;                                                        // grows when something may have changed
+  std::map<std::string, std::unique_ptr<ConductedReconstruction>> conducted_;  // here
+  bool look_ = false;                                                          // the overseer should look now
   bool stopping_ = false;
+  std::condition_variable overseer_wake_;
+  std::thread overseer_;
 };
 
 // Whether nothing will change any more.

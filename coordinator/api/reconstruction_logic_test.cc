@@ -81,10 +81,12 @@ class ReconstructionLogicTest : public testing::Test {
   // As a coordinator that is started anew.
   void Open() {
     logic_.reset();
+    workers_.reset();
     store_.reset();
-    workers_ = std::make_unique<WorkerLogic>(LeaseOptions{.lease = absl::Seconds(30), .job_time_limit = absl::Hours(1)},
-                                             clock_);
     store_ = *OpenSqliteJobStore(folder_ + "/state.sqlite");
+    const RetryOptions retry = {.backoff = absl::Milliseconds(1)};
+    workers_ = std::make_unique<WorkerLogic>(LeaseOptions{.lease = absl::Seconds(30), .job_time_limit = absl::Hours(1)},
+                                             retry, *store_);
     auto opened = ReconstructionLogic::Open({.data_folder = folder_ + "/data", .scene_roots = {folder_ + "/roots"}},
                                             {.store = store_.get(),
                                              .blobs = blobs_.get(),
@@ -92,7 +94,7 @@ class ReconstructionLogicTest : public testing::Test {
                                              .pool = &pool_,
                                              .workers = workers_.get(),
                                              .parse_method = ParseTestMethod,
-                                             .retry = {.backoff = absl::Milliseconds(1)}});
+                                             .retry = retry});
     MW_CHECK(opened.ok());
     logic_ = *std::move(opened);
   }
@@ -286,7 +288,6 @@ TEST_F(ReconstructionLogicTest, AnUploadIsThereWholeOrNotAtAll) {
   header.set_path("a/b.txt");
   header.set_size_bytes(4);
   header.set_sha256(Sha256Hex(std::string("wall")));
-  const std::string path = folder_ + "/data/uploads/up/a/b.txt";
   const auto send = [&](const std::string& bytes) {
     auto upload = logic_->BeginUpload(header);
     MW_CHECK(upload.ok());
@@ -295,10 +296,12 @@ TEST_F(ReconstructionLogicTest, AnUploadIsThereWholeOrNotAtAll) {
   };
   for (const char* wrong : {"wal", "walls", "Wall"}) {
     EXPECT_TRUE(absl::IsInvalidArgument(send(wrong)));
-    EXPECT_FALSE(fs::exists(path));
+    EXPECT_TRUE(logic_->ListSceneFiles("up")->empty());
   }
   EXPECT_TRUE(send("wall").ok());
-  EXPECT_EQ(*ReadFile(path), "wall");
+  EXPECT_THAT(*logic_->ListSceneFiles("up"), testing::ElementsAre(SceneFile{"a/b.txt", 4, header.sha256()}));
+  EXPECT_EQ(*blobs_->Get(header.sha256()), "wall");
+  EXPECT_TRUE(fs::is_empty(folder_ + "/data/uploads"));
 }
 
 }  // namespace

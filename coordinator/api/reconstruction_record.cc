@@ -1,102 +1,84 @@
 #include "coordinator/api/reconstruction_record.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
-#include <nlohmann/json.hpp>
 
-#include "common/base/files.h"
-#include "common/base/status_macros.h"
+#include "coordinator/api/proto_times.h"
 
 namespace meshwright {
 namespace {
 
-namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
-
-constexpr char kSuffix[] = ".json";
 constexpr size_t kMaxIdLength = 64;
+constexpr std::pair<const char*, v1::AttemptEnding> kEndings[] = {{"finished", v1::ATTEMPT_ENDING_FINISHED},
+                                                                  {"failed", v1::ATTEMPT_ENDING_FAILED},
+                                                                  {"out_of_memory", v1::ATTEMPT_ENDING_OUT_OF_MEMORY},
+                                                                  {"lost", v1::ATTEMPT_ENDING_LOST},
+                                                                  {"given_back", v1::ATTEMPT_ENDING_GIVEN_BACK}};
 
 }  // namespace
 
-std::string EncodeRecord(const ReconstructionRecord& record) {
-  Json json;
-  json["id"] = record.id;
-  json["state"] = v1::ReconstructionState_Name(record.state);
-  json["deleted"] = record.deleted;
-  json["failure"] = record.failure;
-  json["options"] = record.options_json;
-  json["scene_reference"] = record.scene_reference;
-  json["weight"] = record.weight;
-  json["created_unix_us"] = absl::ToUnixMicros(record.created);
-  if (record.finished != absl::InfinitePast()) json["finished_unix_us"] = absl::ToUnixMicros(record.finished);
-  json["scene_blob"] = record.scene_blob;
-  json["mesh_bytes"] = record.mesh_bytes;
-  json["mesh_sha256"] = record.mesh_sha256;
-  json["vertices"] = record.vertices;
-  json["faces"] = record.faces;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-absl::StatusOr<ReconstructionRecord> DecodeRecord(const std::string& text) {
-  ReconstructionRecord record;
-  try {
-    const Json json = Json::parse(text);
-    record.id = json.at("id").get<std::string>();
-    if (!v1::ReconstructionState_Parse(json.at("state").get<std::string>(), &record.state)) {
-      return absl::DataLossError(absl::StrCat("state is ", json.at("state").dump(), ", expected one that is known"));
-    }
-    record.deleted = json.at("deleted").get<bool>();
-    record.failure = json.at("failure").get<std::string>();
-    record.options_json = json.at("options").get<std::string>();
-    record.scene_reference = json.at("scene_reference").get<std::string>();
-    record.weight = json.at("weight").get<double>();
-    record.created = absl::FromUnixMicros(json.at("created_unix_us").get<int64_t>());
-    if (json.contains("finished_unix_us")) {
-      record.finished = absl::FromUnixMicros(json.at("finished_unix_us").get<int64_t>());
-    }
-    record.scene_blob = json.at("scene_blob").get<std::string>();
-    record.mesh_bytes = json.at("mesh_bytes").get<int64_t>();
-    record.mesh_sha256 = json.at("mesh_sha256").get<std::string>();
-    record.vertices = json.at("vertices").get<int64_t>();
-    record.faces = json.at("faces").get<int64_t>();
-  } catch (const Json::exception& error) {
-    return absl::DataLossError(absl::StrCat("not a reconstruction's record: ", error.what()));
+v1::ReconstructionState ToProto(ReconstructionState state) {
+  switch (state) {
+    case ReconstructionState::kCreated:
+      return v1::RECONSTRUCTION_STATE_CREATED;
+    case ReconstructionState::kPreparing:
+      return v1::RECONSTRUCTION_STATE_PREPARING;
+    case ReconstructionState::kRunning:
+      return v1::RECONSTRUCTION_STATE_RUNNING;
+    case ReconstructionState::kJoining:
+      return v1::RECONSTRUCTION_STATE_JOINING;
+    case ReconstructionState::kDone:
+      return v1::RECONSTRUCTION_STATE_DONE;
+    case ReconstructionState::kCancelled:
+      return v1::RECONSTRUCTION_STATE_CANCELLED;
+    case ReconstructionState::kFailed:
+      return v1::RECONSTRUCTION_STATE_FAILED;
+    case ReconstructionState::kDeleting:
+      break;
   }
-  return record;
+  return v1::RECONSTRUCTION_STATE_UNSPECIFIED;
 }
 
-absl::StatusOr<RecordFolder> RecordFolder::Open(const std::string& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return absl::PermissionDeniedError(absl::StrCat(folder, ": cannot make the folder: ", error.message()));
-  return RecordFolder(folder);
+v1::Reconstruction ToProto(const Reconstruction& stored) {
+  v1::Reconstruction reconstruction;
+  reconstruction.set_id(stored.id);
+  reconstruction.set_state(ToProto(stored.state));
+  if (stored.state == ReconstructionState::kFailed) reconstruction.set_failure(stored.state_reason);
+  reconstruction.set_options_json(stored.options_json);
+  reconstruction.set_scene_reference(stored.scene_reference);
+  reconstruction.set_weight(stored.weight);
+  FillTime(stored.created_at, *reconstruction.mutable_create_time());
+  if (stored.finished_at != absl::InfinitePast()) FillTime(stored.finished_at, *reconstruction.mutable_finish_time());
+  reconstruction.set_mesh_bytes(stored.mesh.bytes);
+  reconstruction.set_mesh_sha256(stored.mesh.digest);
+  v1::Progress& progress = *reconstruction.mutable_progress();
+  progress.set_cameras_total(static_cast<int32_t>(stored.progress.cameras_total));
+  progress.set_cameras_committed(static_cast<int32_t>(stored.progress.cameras_committed));
+  progress.set_cameras_set_aside(static_cast<int32_t>(stored.progress.cameras_set_aside));
+  progress.set_cameras_in_flight(static_cast<int32_t>(stored.progress.cameras_in_flight));
+  progress.set_patches_filtered(stored.progress.patches_filtered);
+  progress.set_patches_accepted(stored.progress.patches_accepted);
+  progress.set_vertices(stored.mesh.vertices);
+  progress.set_faces(stored.mesh.faces);
+  return reconstruction;
 }
 
-absl::Status RecordFolder::Save(const ReconstructionRecord& record) const {
-  return WriteFileAtomically(absl::StrCat(folder_, "/", record.id, kSuffix), EncodeRecord(record));
-}
-
-absl::StatusOr<std::vector<ReconstructionRecord>> RecordFolder::LoadAll() const {
-  std::vector<std::string> paths;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder_, error)) {
-    if (entry.path().extension() == kSuffix) paths.push_back(entry.path().string());
+v1::Attempt ToProto(const std::string& reconstruction, const Attempt& stored) {
+  v1::Attempt attempt;
+  attempt.set_reconstruction_id(reconstruction);
+  attempt.set_sequence(stored.sequence);
+  attempt.set_camera(stored.camera);
+  attempt.set_epoch(stored.epoch);
+  attempt.set_worker(stored.worker);
+  FillTime(stored.began_at, *attempt.mutable_begin_time());
+  FillTime(stored.ended_at, *attempt.mutable_end_time());
+  for (const auto& [text, ending] : kEndings) {
+    if (stored.ending == text) attempt.set_ending(ending);
   }
-  if (error) return absl::PermissionDeniedError(absl::StrCat(folder_, ": cannot look into it: ", error.message()));
-  std::sort(paths.begin(), paths.end());
-  std::vector<ReconstructionRecord> records;
-  for (const std::string& path : paths) {
-    MW_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
-    absl::StatusOr<ReconstructionRecord> record = DecodeRecord(text);
-    if (!record.ok()) {
-      return absl::Status(record.status().code(), absl::StrCat(path, ": ", std::string(record.status().message())));
-    }
-    records.push_back(*std::move(record));
-  }
-  return records;
+  attempt.set_reason(stored.reason);
+  return attempt;
 }
 
 absl::Status ValidateReconstructionId(const std::string& id) {

@@ -1,5 +1,6 @@
 #include "coordinator/api/scene_intake.h"
 
+#include <atomic>
 #include <filesystem>
 #include <optional>
 #include <utility>
@@ -7,9 +8,11 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
+#include <unistd.h>
 
 #include "common/base/bad_input.h"
 #include "common/base/status_macros.h"
+#include "common/blob/lost_blob.h"
 #include "common/scene/import.h"
 #include "common/scene/scene_check.h"
 #include "common/scene/scene_codec.h"
@@ -66,11 +69,17 @@ absl::StatusOr<std::string> ResolveSceneReference(const std::string& reference, 
       absl::StrCat("scene_reference \"", reference, "\": no such folder below the ", roots.size(), " roots of scenes"));
 }
 
-SceneFileUpload::SceneFileUpload(AtomicFile file, std::string path, int64_t size_bytes, std::string sha256)
-    : file_(std::move(file)), path_(std::move(path)), size_bytes_(size_bytes), sha256_(std::move(sha256)) {}
+SceneFileUpload::SceneFileUpload(AtomicFile file, std::string local_path, std::string path, int64_t size_bytes,
+                                 std::string sha256, Keep keep)
+    : file_(std::move(file)),
+      local_path_(std::move(local_path)),
+      path_(std::move(path)),
+      size_bytes_(size_bytes),
+      sha256_(std::move(sha256)),
+      keep_(std::move(keep)) {}
 
 absl::StatusOr<SceneFileUpload> SceneFileUpload::Begin(const std::string& folder, const std::string& path,
-                                                       int64_t size_bytes, const std::string& sha256) {
+                                                       int64_t size_bytes, const std::string& sha256, Keep keep) {
   MW_RETURN_IF_ERROR(ValidateRelativePath(path));
   if (size_bytes < 0 || size_bytes > kMaxFileBytes) {
     return absl::InvalidArgumentError(absl::StrCat("size_bytes is ", size_bytes, ", expected 0..", kMaxFileBytes));
@@ -78,14 +87,10 @@ absl::StatusOr<SceneFileUpload> SceneFileUpload::Begin(const std::string& folder
   if (!ValidateDigest(sha256).ok()) {
     return absl::InvalidArgumentError("sha256: 64 lower-case hexadecimal digits expected");
   }
-  const fs::path target = fs::path(folder) / path;
-  std::error_code error;
-  fs::create_directories(target.parent_path(), error);
-  if (error) {
-    return absl::InvalidArgumentError(absl::StrCat("path \"", path, "\": cannot make its folder: ", error.message()));
-  }
-  MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(target.string()));
-  return SceneFileUpload(std::move(file), path, size_bytes, sha256);
+  static std::atomic<int64_t> counter{0};
+  const std::string local_path = absl::StrCat(folder, "/", ::getpid(), "-", counter++);
+  MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(local_path));
+  return SceneFileUpload(std::move(file), local_path, path, size_bytes, sha256, std::move(keep));
 }
 
 absl::Status SceneFileUpload::Append(const std::string& chunk) {
@@ -105,10 +110,14 @@ absl::Status SceneFileUpload::Finish() {
   if (const std::string digest = digest_->HexDigest(); digest != sha256_) {
     return absl::InvalidArgumentError(absl::StrCat(path_, ": its bytes have sha256 ", digest, ", not ", sha256_));
   }
-  return file_.Commit();
+  MW_RETURN_IF_ERROR(file_.Commit());
+  const absl::Status kept = keep_(local_path_);
+  std::error_code error;
+  fs::remove(local_path_, error);
+  return kept;
 }
 
-absl::StatusOr<TakenScene> TakeScene(const std::string& folder, BlobStore& blobs, ThreadPool& pool) {
+absl::StatusOr<TakenScene> TakeScene(const std::string& folder, HeldBlobs& blobs, ThreadPool& pool) {
   absl::StatusOr<Scene> scene = ImportScene(folder, std::nullopt);
   if (!scene.ok()) return BadInput(scene.status());
   TakenScene taken;
@@ -119,6 +128,28 @@ absl::StatusOr<TakenScene> TakeScene(const std::string& folder, BlobStore& blobs
   }
   MW_ASSIGN_OR_RETURN(taken.scene_blob, blobs.Put(EncodeScene(*scene)));
   return taken;
+}
+
+absl::Status LayOutScene(const std::vector<SceneFile>& files, BlobStore& blobs, const std::string& folder) {
+  std::error_code error;
+  fs::remove_all(folder, error);
+  fs::create_directories(folder, error);
+  if (error) return absl::PermissionDeniedError(absl::StrCat(folder, ": cannot make the folder: ", error.message()));
+  for (const SceneFile& file : files) {
+    const fs::path path = fs::path(folder) / file.path;
+    fs::create_directories(path.parent_path(), error);
+    if (error) {
+      return BadInput(absl::InvalidArgumentError(
+          absl::StrCat("path \"", file.path, "\": cannot make its folder: ", error.message())));
+    }
+    const absl::Status got = blobs.GetFile(file.digest, path.string());
+    if (IsBlobLost(got)) {
+      return absl::DataLossError(
+          absl::StrCat("the uploaded file ", file.path, " is damaged or lost (blob ", file.digest, ")"));
+    }
+    MW_RETURN_IF_ERROR(got);
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace meshwright

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,6 +13,8 @@
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
 #include "common/scene/scene.h"
+#include "coordinator/api/held_blobs.h"
+#include "coordinator/store/job_store.h"
 
 namespace meshwright {
 
@@ -25,18 +28,24 @@ absl::StatusOr<std::string> ResolveSceneReference(const std::string& reference, 
 // A file of a scene that arrives in pieces: there, whole and with its digest, or not at all.
 class SceneFileUpload {
  public:
-  // The file will be FOLDER/path. Makes the folders.
+  // Takes the file where it lies, whole and checked, e.g. into the BlobStore.
+  using Keep = std::function<absl::Status(const std::string& local_path)>;
+
+  // Pieces are collected in a file of their own in `folder`, which is there. InvalidArgument names the field.
   static absl::StatusOr<SceneFileUpload> Begin(const std::string& folder, const std::string& path, int64_t size_bytes,
-                                               const std::string& sha256);
+                                               const std::string& sha256, Keep keep);
   absl::Status Append(const std::string& chunk);
   absl::Status Finish();
 
  private:
-  SceneFileUpload(AtomicFile file, std::string path, int64_t size_bytes, std::string sha256);
+  SceneFileUpload(AtomicFile file, std::string local_path, std::string path, int64_t size_bytes, std::string sha256,
+                  Keep keep);
   AtomicFile file_;
+  std::string local_path_;
   std::string path_;
   int64_t size_bytes_;
   std::string sha256_;
+  Keep keep_;
   int64_t received_ = 0;
   std::unique_ptr<Sha256Stream> digest_ = std::make_unique<Sha256Stream>();
 };
@@ -48,6 +57,9 @@ struct TakenScene {
 
 // Reads the scene in `folder`, checks every photograph and puts all of it into the BlobStore: from then on the folder
 // is not needed any more and nothing that happens to it changes the reconstruction. Errors of the scene are bad input.
-absl::StatusOr<TakenScene> TakeScene(const std::string& folder, BlobStore& blobs, ThreadPool& pool);
+absl::StatusOr<TakenScene> TakeScene(const std::string& folder, HeldBlobs& blobs, ThreadPool& pool);
+
+// Makes `folder` anew with the files of an upload. DataLoss names a file whose blob is damaged or lost.
+absl::Status LayOutScene(const std::vector<SceneFile>& files, BlobStore& blobs, const std::string& folder);
 
 }  // namespace meshwright

@@ -1,24 +1,50 @@
 #include "coordinator/api/worker_logic.h"
 
 #include <algorithm>
-#include <chrono>
+#include <future>
 #include <set>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include "common/base/status_macros.h"
+#include "common/job/job_spec_codec.h"
+#include "coordinator/api/proto_times.h"
 
 namespace meshwright {
 namespace {
 
+using SteadyClock = std::chrono::steady_clock;
+
 constexpr size_t kMaxIdLength = 128;
 constexpr int kMaxCores = 4096;
 constexpr double kMaxPatienceSeconds = 60;
-// Backoffs end and clients go away without anybody saying so.
-constexpr std::chrono::milliseconds kLookAgain(200);
+// Other coordinators, and backoffs that end, are noticed by looking again: often while a worker waits.
+constexpr std::chrono::milliseconds kLookAgain(100);
+constexpr std::chrono::milliseconds kLookAgainIdle(1000);
+constexpr std::chrono::milliseconds kAfterTrouble(200);
+// Workers are shown for a while after they were heard of last.
+constexpr int kLeasesUntilForgotten = 10;
+constexpr absl::Duration kLookAtWorkers = absl::Seconds(1);
+constexpr size_t kMaxBackgrounds = 1000;
 
 JobKey FromProto(const v1::JobKey& key) { return {key.reconstruction_id(), key.sequence(), key.epoch()}; }
+JobKey KeyOf(const OpenJob& job) { return {job.reconstruction_id, job.sequence, job.epoch}; }
+
+void FillKey(const OpenJob& job, v1::JobKey& key) {
+  key.set_reconstruction_id(job.reconstruction_id);
+  key.set_sequence(job.sequence);
+  key.set_epoch(job.epoch);
+}
+
+std::set<JobKey> RunningAt(const v1::SynchronizeRequest& request) {
+  std::set<JobKey> running;
+  for (const v1::HeldJob& held : request.held()) {
+    if (held.outcome_case() == v1::HeldJob::kRunning) running.insert(FromProto(held.key()));
+  }
+  return running;
+}
 
 absl::Status Validate(const v1::SynchronizeRequest& request) {
   if (request.worker_id().empty() || request.worker_id().size() > kMaxIdLength) {
@@ -42,170 +68,29 @@ absl::Status Validate(const v1::SynchronizeRequest& request) {
   return absl::OkStatus();
 }
 
-void FillJob(const LeaseBook::Lease& lease, const LeasedReconstruction& reconstruction, v1::CameraJob& job) {
-  const CameraJobSpec& spec = lease.job.spec;
-  job.mutable_key()->set_reconstruction_id(lease.key.reconstruction);
-  job.mutable_key()->set_sequence(lease.key.sequence);
-  job.mutable_key()->set_epoch(lease.key.epoch);
-  job.set_camera(spec.camera);
-  job.set_snapshot(spec.snapshot);
-  for (const CameraIndex neighbour : spec.neighbours) job.add_neighbours(neighbour);
-  for (const CameraIndex target : spec.targets) job.add_targets(target);
-  for (const AcceptedSurface& accepted : spec.accepted) {
-    v1::AcceptedSurface& surface = *job.add_accepted();
-    surface.set_sequence(accepted.sequence);
-    surface.set_camera(accepted.camera);
-    surface.set_digest(accepted.digest);
-    surface.set_patches(accepted.patches);
-  }
-  job.set_options_json(reconstruction.options_json);
-  job.set_scene_digest(reconstruction.scene_digest);
-  job.set_memory_bytes(lease.job.memory_bytes);
+double Gibibytes(int64_t bytes) { return static_cast<double>(bytes) / static_cast<double>(int64_t{1} << 30); }
+
+v1::Attempt RunningAttempt(const OpenJob& job) {
+  v1::Attempt attempt;
+  attempt.set_reconstruction_id(job.reconstruction_id);
+  attempt.set_sequence(job.sequence);
+  attempt.set_camera(job.camera);
+  attempt.set_epoch(job.epoch);
+  attempt.set_worker(job.lease_worker);
+  FillTime(job.leased_at, *attempt.mutable_begin_time());
+  return attempt;
 }
 
 }  // namespace
 
-WorkerLogic::WorkerLogic(const LeaseOptions& options, const Clock& clock)
-    : options_(options), clock_(clock), book_(options) {}
-
-void WorkerLogic::AddReconstruction(const std::string& id, LeasedReconstruction reconstruction) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  book_.AddReconstruction(id, reconstruction.weight);
-  reconstructions_[id] = std::move(reconstruction);
+WorkerLogic::WorkerLogic(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store)
+    : lease_(lease), retry_(retry), store_(store) {
+  thread_ = std::thread([this] { Run(); });
 }
 
-void WorkerLogic::RemoveReconstruction(const std::string& id) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    book_.RemoveReconstruction(id);
-    reconstructions_.erase(id);
-  }
-  changed_.notify_all();
-}
-
-void WorkerLogic::Offer(const std::string& id, CameraJobSpec spec, int64_t memory_bytes, absl::Time not_before) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    book_.Offer(id, {.spec = std::move(spec), .memory_bytes = memory_bytes}, not_before);
-  }
-  changed_.notify_all();
-}
-
-int WorkerLogic::LeasesIn(const std::string& id) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return book_.LeasesIn(id);
-}
-
-void WorkerLogic::Tell(const LeaseBook::Lease& lease, JobOutcome::Kind kind, std::string reason) {
-  const auto found = reconstructions_.find(lease.key.reconstruction);
-  if (found == reconstructions_.end()) return;
-  found->second.sink(
-      {.kind = kind, .sequence = lease.key.sequence, .epoch = lease.key.epoch, .reason = std::move(reason)});
-}
-
-void WorkerLogic::Settle(const std::string& worker, const v1::HeldJob& held) {
-  if (held.outcome_case() == v1::HeldJob::kRunning || held.outcome_case() == v1::HeldJob::OUTCOME_NOT_SET) return;
-  const JobKey key = FromProto(held.key());
-  if (!book_.End(worker, key)) return;  // taken already, or somebody else has the job now
-  JobOutcome outcome = {.sequence = key.sequence, .epoch = key.epoch};
-  switch (held.outcome_case()) {
-    case v1::HeldJob::kFinished:
-      outcome.filtered_digest = held.finished().filtered_digest();
-      outcome.weak_targets.assign(held.finished().weak_targets().begin(), held.finished().weak_targets().end());
-      outcome.report_json = held.finished().report_json();
-      break;
-    case v1::HeldJob::kFailed:
-      outcome.kind = held.failed().infrastructure() ? JobOutcome::Kind::kLost : JobOutcome::Kind::kFailed;
-      outcome.reason = held.failed().reason();
-      break;
-    default:
-      outcome.kind = JobOutcome::Kind::kGivenBack;
-      outcome.reason = absl::StrCat("worker ", worker, " gave it back");
-      break;
-  }
-  const auto found = reconstructions_.find(key.reconstruction);
-  if (found != reconstructions_.end()) found->second.sink(std::move(outcome));
-}
-
-v1::SynchronizeResponse WorkerLogic::Answer(const std::string& worker) const {
-  v1::SynchronizeResponse response;
-  for (const LeaseBook::Lease* const lease : book_.LeasesOf(worker)) {
-    FillJob(*lease, reconstructions_.at(lease->key.reconstruction), *response.add_jobs());
-  }
-  response.set_lease_seconds(absl::ToDoubleSeconds(options_.lease));
-  response.set_call_again_seconds(absl::ToDoubleSeconds(options_.lease / 3));
-  return response;
-}
-
-absl::StatusOr<v1::SynchronizeResponse> WorkerLogic::Synchronize(const v1::SynchronizeRequest& request,
-                                                                 const std::function<bool()>& cancelled) {
-  MW_RETURN_IF_ERROR(Validate(request));
-  const WorkerCapacity capacity = {.id = request.worker_id(),
-                                   .instance = request.instance(),
-                                   .version = request.version(),
-                                   .cores = request.cores(),
-                                   .memory_bytes = request.memory_bytes(),
-                                   .draining = request.draining()};
-  std::set<JobKey> known;  // running at the worker
-  std::unique_lock<std::mutex> lock(mutex_);
-  for (const LeaseBook::Lease& lost : book_.Hear(capacity, clock_.Now())) {
-    Tell(lost, JobOutcome::Kind::kLost, absl::StrCat("worker ", capacity.id, " was started anew"));
-  }
-  bool settled = false;
-  for (const v1::HeldJob& held : request.held()) {
-    if (held.outcome_case() == v1::HeldJob::kRunning) {
-      known.insert(FromProto(held.key()));
-    } else {
-      Settle(capacity.id, held);
-      settled = true;  // the worker waits to hear that it was taken
-    }
-  }
-  const auto patience =
-      std::chrono::duration<double>(std::min(request.patience_seconds(), absl::ToDoubleSeconds(options_.lease / 3)));
-  const auto deadline = std::chrono::steady_clock::now() + patience;
-  while (true) {
-    book_.Grant(capacity.id, clock_.Now());
-    std::set<JobKey> wanted;
-    for (const LeaseBook::Lease* const lease : book_.LeasesOf(capacity.id)) wanted.insert(lease->key);
-    if (settled || stopping_ || wanted != known || std::chrono::steady_clock::now() >= deadline) break;
-    changed_.wait_for(lock, kLookAgain);
-    if (cancelled()) return absl::CancelledError("the worker does not wait any more");
-    const auto worker = book_.workers().find(capacity.id);
-    if (worker == book_.workers().end() || worker->second.capacity.instance != capacity.instance) {
-      return absl::AbortedError(absl::StrCat("worker ", capacity.id, " was started anew"));
-    }
-  }
-  return Answer(capacity.id);
-}
-
-void WorkerLogic::ExpireLeases() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  for (const LeaseBook::Expired& expired : book_.Expire(clock_.Now())) {
-    if (expired.too_long) {
-      Tell(expired.lease, JobOutcome::Kind::kFailed,
-           absl::StrCat("took longer than ", absl::FormatDuration(options_.job_time_limit)));
-    } else {
-      Tell(expired.lease, JobOutcome::Kind::kLost, absl::StrCat("worker ", expired.lease.worker, " is silent"));
-    }
-  }
-}
-
-v1::ListWorkersResponse WorkerLogic::ListWorkers() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  v1::ListWorkersResponse response;
-  for (const auto& [id, entry] : book_.workers()) {
-    v1::Worker& worker = *response.add_workers();
-    worker.set_id(id);
-    worker.set_cores(entry.capacity.cores);
-    worker.set_memory_bytes(entry.capacity.memory_bytes);
-    worker.set_draining(entry.capacity.draining);
-    worker.set_version(entry.capacity.version);
-    worker.set_jobs(static_cast<int>(entry.leases.size()));
-    const int64_t nanoseconds = absl::ToUnixNanos(entry.last_seen);
-    worker.mutable_last_seen()->set_seconds(nanoseconds / 1'000'000'000);
-    worker.mutable_last_seen()->set_nanos(static_cast<int32_t>(nanoseconds % 1'000'000'000));
-  }
-  return response;
+WorkerLogic::~WorkerLogic() {
+  Shutdown();
+  thread_.join();
 }
 
 void WorkerLogic::Shutdown() {
@@ -213,7 +98,370 @@ void WorkerLogic::Shutdown() {
     const std::lock_guard<std::mutex> lock(mutex_);
     stopping_ = true;
   }
-  changed_.notify_all();
+  wake_.notify_all();
+}
+
+void WorkerLogic::Wake() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    awake_ = true;
+  }
+  wake_.notify_all();
+}
+
+void WorkerLogic::SetListener(std::function<void(const std::string&)> listener) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  listener_ = std::move(listener);
+}
+
+int64_t WorkerLogic::Synchronize(const v1::SynchronizeRequest& request, Answer answer) {
+  absl::Status status = Validate(request);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (stopping_ && status.ok()) status = absl::UnavailableError("the coordinator is going down");
+    if (status.ok()) {
+      const double patience = std::min(request.patience_seconds(), absl::ToDoubleSeconds(lease_.lease / 3));
+      const auto deadline = SteadyClock::now() +
+                            std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(patience));
+      calls_.push_back({.number = next_call_++, .request = request, .answer = std::move(answer), .deadline = deadline});
+      awake_ = true;
+      wake_.notify_all();
+      return calls_.back().number;
+    }
+  }
+  answer(status);
+  return 0;
+}
+
+void WorkerLogic::Abandon(int64_t call) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    abandoned_.push_back(call);
+    awake_ = true;
+  }
+  wake_.notify_all();
+}
+
+absl::StatusOr<v1::SynchronizeResponse> WorkerLogic::Synchronize(const v1::SynchronizeRequest& request,
+                                                                 const std::function<bool()>& cancelled) {
+  const auto promise = std::make_shared<std::promise<absl::StatusOr<v1::SynchronizeResponse>>>();
+  std::future<absl::StatusOr<v1::SynchronizeResponse>> answer = promise->get_future();
+  const int64_t call = Synchronize(request, [promise](absl::StatusOr<v1::SynchronizeResponse> response) {
+    promise->set_value(std::move(response));
+  });
+  while (answer.wait_for(kLookAgain) != std::future_status::ready) {
+    if (cancelled()) Abandon(call);
+  }
+  return answer.get();
+}
+
+void WorkerLogic::Run() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (true) {
+    const auto look_again =
+        calls_.empty()
+            ? std::min(kLookAgainIdle, std::chrono::milliseconds(absl::ToInt64Milliseconds(lease_.lease / 5)))
+            : kLookAgain;
+    auto until = SteadyClock::now() + look_again;
+    for (const Call& call : calls_) until = std::min(until, call.deadline);
+    wake_.wait_until(lock, until, [&] { return awake_ || stopping_; });
+    awake_ = false;
+    const bool last = stopping_;
+    lock.unlock();
+    Turn();
+    lock.lock();
+    if (last && calls_.empty()) return;
+  }
+}
+
+void WorkerLogic::Turn() {
+  std::list<Call> calls;
+  std::vector<int64_t> abandoned;
+  bool stopping = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    calls.swap(calls_);
+    abandoned.swap(abandoned_);
+    stopping = stopping_;
+  }
+  std::map<std::string, int64_t> newest;
+  for (const Call& call : calls) newest[call.request.worker_id()] = call.number;
+  for (auto call = calls.begin(); call != calls.end();) {
+    absl::Status end;
+    if (std::find(abandoned.begin(), abandoned.end(), call->number) != abandoned.end()) {
+      end = absl::CancelledError("the worker does not wait any more");
+    } else if (newest[call->request.worker_id()] != call->number) {
+      end = absl::AbortedError(absl::StrCat("worker ", call->request.worker_id(), " has called again"));
+    }
+    if (end.ok()) {
+      if (stopping) call->deadline = SteadyClock::now();
+      ++call;
+    } else {
+      call->answer(end);
+      call = calls.erase(call);
+    }
+  }
+  const absl::Status status = TakeTurn(calls);
+  if (!status.ok()) {
+    for (auto call = calls.begin(); call != calls.end();) {
+      if (call->is_heard && call->deadline > SteadyClock::now()) {
+        ++call;
+        continue;
+      }
+      call->answer(status);
+      call = calls.erase(call);
+    }
+    if (!stopping) std::this_thread::sleep_for(kAfterTrouble);
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  calls_.splice(calls_.begin(), calls);
+}
+
+absl::Status WorkerLogic::TakeTurn(std::list<Call>& calls) {
+  MW_ASSIGN_OR_RETURN(const absl::Time now, store_.Now());
+  MW_ASSIGN_OR_RETURN(std::vector<OpenJob> open, store_.ListOpenJobs());
+  MW_RETURN_IF_ERROR(LookAtWorkers(now));
+  // Who could not be heard was not silent: after a pause of this coordinator (or its store) workers get some time.
+  if (now - last_turn_ > lease_.lease / 2) silence_counts_from_ = now + lease_.lease / 2;
+  last_turn_ = now;
+
+  TurnPlan plan(lease_, retry_, std::move(open), now, [this](const OpenJob& job) -> std::vector<int64_t> {
+    const absl::StatusOr<CameraJob> stored = store_.GetCameraJob(job.reconstruction_id, job.sequence);
+    if (!stored.ok()) return {};
+    const absl::StatusOr<StoredJobSpec> spec = DecodeJobSpec(stored->spec);
+    return spec.ok() ? spec->memory_bytes : std::vector<int64_t>();
+  });
+  for (Call& call : calls) {
+    if (!call.is_heard) call.is_settled = plan.Hear(call.request);
+  }
+  plan.Expire(now >= silence_counts_from_);
+  for (const Call& call : calls) {
+    const auto worker = written_workers_.find(call.request.worker_id());
+    if (worker == written_workers_.end() || !worker->second.drained) plan.Grant(call.request);
+  }
+  MW_RETURN_IF_ERROR(Apply(plan, Heartbeats(calls, now), now));
+  Publish(plan, now);
+
+  for (auto call = calls.begin(); call != calls.end();) {
+    call->is_heard = true;
+    const std::vector<const OpenJob*> held = plan.HeldBy(call->request.worker_id(), call->request.instance());
+    std::set<JobKey> wanted;
+    for (const OpenJob* const job : held) wanted.insert(KeyOf(*job));
+    if (!call->is_settled && wanted == RunningAt(call->request) && call->deadline > SteadyClock::now()) {
+      ++call;
+      continue;
+    }
+    call->answer(AnswerTo(*call, held));
+    call = calls.erase(call);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status WorkerLogic::Apply(TurnPlan& plan, const std::vector<WorkerRecord>& heartbeats, absl::Time now) {
+  const std::vector<TurnPlan::Change> decided = plan.changes();
+  std::vector<JobChange> changes;
+  changes.reserve(decided.size());
+  for (const TurnPlan::Change& one : decided) changes.push_back(one.change);
+  MW_ASSIGN_OR_RETURN(std::vector<JobChangeResult> results, store_.ApplyChanges(changes, heartbeats, now));
+  for (const WorkerRecord& worker : heartbeats) written_workers_[worker.id] = worker;
+
+  std::set<std::string> news;
+  std::vector<JobChange> refused;
+  for (size_t i = 0; i < decided.size(); ++i) {
+    const JobChange& change = decided[i].change;
+    const OpenJob job = plan.jobs()[decided[i].job];
+    plan.Settle(decided[i], results[i]);
+    if (results[i].status.ok() && change.kind == JobChange::Kind::kClaim) {
+      claimed_[{change.id, change.sequence}] = *std::move(results[i].job);
+    }
+    const bool is_result = change.kind == JobChange::Kind::kComplete || change.kind == JobChange::Kind::kSetAside;
+    if (is_result && results[i].status.ok()) news.insert(change.id);
+    // A result that the store does not take is a failure of the job; or nobody's any more, which the fence tells.
+    if (change.kind == JobChange::Kind::kComplete && !results[i].status.ok() && !job.lease_worker.empty()) {
+      refused.push_back(plan.FailureOf(
+          job, job.is_repair ? "made again, the result is another one" : std::string(results[i].status.message()),
+          false));
+    }
+  }
+  if (!refused.empty()) {
+    MW_RETURN_IF_ERROR(store_.ApplyChanges(refused, {}, now).status());
+    for (const JobChange& change : refused) news.insert(change.id);
+  }
+  for (const auto& [reconstruction, digest] : plan.damaged_blobs()) {
+    MW_RETURN_IF_ERROR(store_.ReportDamagedBlob(reconstruction, digest));
+    news.insert(reconstruction);
+  }
+  std::function<void(const std::string&)> listener;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    listener = listener_;
+  }
+  if (listener) {
+    for (const std::string& reconstruction : news) listener(reconstruction);
+  }
+  return absl::OkStatus();
+}
+
+std::vector<WorkerRecord> WorkerLogic::Heartbeats(const std::list<Call>& calls, absl::Time now) {
+  std::vector<WorkerRecord> heartbeats;
+  for (const Call& call : calls) {
+    const v1::SynchronizeRequest& request = call.request;
+    const WorkerRecord& before = written_workers_[request.worker_id()];
+    const WorkerRecord heard = {.id = request.worker_id(),
+                                .cores = request.cores(),
+                                .memory_bytes = request.memory_bytes(),
+                                .last_heartbeat = now,
+                                .drained = before.drained,
+                                .instance = request.instance(),
+                                .version = request.version(),
+                                .draining = request.draining()};
+    const bool is_same = before.cores == heard.cores && before.memory_bytes == heard.memory_bytes &&
+                         before.instance == heard.instance && before.version == heard.version &&
+                         before.draining == heard.draining;
+    if (!is_same || now - before.last_heartbeat > lease_.lease / 4) heartbeats.push_back(heard);
+  }
+  return heartbeats;
+}
+
+absl::Status WorkerLogic::LookAtWorkers(absl::Time now) {
+  if (now - last_look_at_workers_ < std::min(lease_.lease / 4, kLookAtWorkers)) return absl::OkStatus();
+  MW_RETURN_IF_ERROR(store_.RemoveSilentWorkers(now - kLeasesUntilForgotten * lease_.lease));
+  MW_ASSIGN_OR_RETURN(const std::vector<WorkerRecord> workers, store_.ListWorkers());
+  last_look_at_workers_ = now;
+  written_workers_.clear();
+  for (const WorkerRecord& worker : workers) written_workers_[worker.id] = worker;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<WorkerLogic::Background> WorkerLogic::BackgroundOf(const std::string& reconstruction) {
+  const auto found = backgrounds_.find(reconstruction);
+  if (found != backgrounds_.end()) return found->second;
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, store_.GetReconstruction(reconstruction));
+  if (backgrounds_.size() >= kMaxBackgrounds) backgrounds_.clear();
+  return backgrounds_[reconstruction] = {.options_json = stored.options_json, .scene_blob = stored.scene_blob};
+}
+
+absl::StatusOr<v1::CameraJob> WorkerLogic::FullJob(const OpenJob& job) {
+  CameraJob& stored = claimed_[{job.reconstruction_id, job.sequence}];
+  if (stored.spec.empty() || stored.epoch != job.epoch) {
+    // Claimed by another coordinator, or by this one before it was started anew.
+    MW_ASSIGN_OR_RETURN(stored, store_.GetCameraJob(job.reconstruction_id, job.sequence));
+  }
+  MW_ASSIGN_OR_RETURN(const StoredJobSpec spec, DecodeJobSpec(stored.spec));
+  MW_ASSIGN_OR_RETURN(const Background background, BackgroundOf(job.reconstruction_id));
+  v1::CameraJob full;
+  FillKey(job, *full.mutable_key());
+  full.set_camera(stored.camera);
+  full.set_snapshot(stored.snapshot);
+  full.mutable_neighbours()->Add(stored.neighbours.begin(), stored.neighbours.end());
+  full.mutable_targets()->Add(spec.targets.begin(), spec.targets.end());
+  for (const AcceptedSurface& accepted : spec.accepted) {
+    v1::AcceptedSurface& surface = *full.add_accepted();
+    surface.set_sequence(accepted.sequence);
+    surface.set_camera(accepted.camera);
+    surface.set_digest(accepted.digest);
+    surface.set_patches(accepted.patches);
+  }
+  full.set_options_json(background.options_json);
+  full.set_scene_digest(background.scene_blob);
+  full.set_memory_bytes(job.memory_bytes);
+  full.set_reduction(static_cast<int32_t>(job.reduction));
+  return full;
+}
+
+absl::StatusOr<v1::SynchronizeResponse> WorkerLogic::AnswerTo(const Call& call,
+                                                              const std::vector<const OpenJob*>& held) {
+  const std::set<JobKey> known = RunningAt(call.request);
+  v1::SynchronizeResponse response;
+  for (const OpenJob* const job : held) {
+    if (known.count(KeyOf(*job)) > 0) {
+      FillKey(*job, *response.add_jobs()->mutable_key());
+    } else {
+      MW_ASSIGN_OR_RETURN(*response.add_jobs(), FullJob(*job));
+    }
+  }
+  response.set_lease_seconds(absl::ToDoubleSeconds(lease_.lease));
+  response.set_call_again_seconds(absl::ToDoubleSeconds(lease_.lease / 3));
+  return response;
+}
+
+void WorkerLogic::Publish(const TurnPlan& plan, absl::Time now) {
+  std::set<std::pair<std::string, SequenceNumber>> leased;
+  for (const OpenJob& job : plan.jobs()) {
+    if (!job.lease_worker.empty()) leased.insert({job.reconstruction_id, job.sequence});
+  }
+  for (auto it = claimed_.begin(); it != claimed_.end();) {
+    it = leased.count(it->first) > 0 ? std::next(it) : claimed_.erase(it);
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  seen_ = plan.jobs();
+  workers_ = written_workers_;
+  seen_at_ = now;
+}
+
+int WorkerLogic::LeasesIn(const std::string& reconstruction) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return static_cast<int>(std::count_if(seen_.begin(), seen_.end(), [&](const OpenJob& job) {
+    return job.reconstruction_id == reconstruction && !job.lease_worker.empty();
+  }));
+}
+
+std::vector<std::string> WorkerLogic::WarningsFor(const std::string& reconstruction) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  int64_t largest_worker = 0;
+  for (const auto& [id, worker] : workers_) {
+    const bool is_alive = seen_at_ - worker.last_heartbeat <= lease_.lease && !worker.draining && !worker.drained;
+    if (is_alive) largest_worker = std::max(largest_worker, worker.memory_bytes);
+  }
+  std::vector<std::string> warnings;
+  bool waits = false;
+  for (const OpenJob& job : seen_) {
+    if (job.reconstruction_id != reconstruction || !job.lease_worker.empty()) continue;
+    waits = true;
+    if (largest_worker == 0 || job.memory_bytes <= largest_worker) continue;
+    warnings.push_back(
+        absl::StrFormat("camera %d needs %.1f GiB of memory, the largest worker has %.1f GiB: start a worker with more",
+                        job.camera, Gibibytes(job.memory_bytes), Gibibytes(largest_worker)));
+  }
+  if (waits && largest_worker == 0) warnings.emplace_back("cameras wait, and no worker is connected");
+  return warnings;
+}
+
+std::vector<v1::Attempt> WorkerLogic::RunningIn(const std::string& reconstruction) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<v1::Attempt> attempts;
+  for (const OpenJob& job : seen_) {
+    if (job.lease_worker.empty() || (!reconstruction.empty() && job.reconstruction_id != reconstruction)) continue;
+    attempts.push_back(RunningAttempt(job));
+  }
+  return attempts;
+}
+
+v1::ListWorkersResponse WorkerLogic::ListWorkers() const {
+  std::map<std::string, WorkerRecord> workers;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    workers = workers_;
+  }
+  v1::ListWorkersResponse response;
+  std::map<std::string, v1::Worker*> by_id;
+  for (const auto& [id, record] : workers) {
+    v1::Worker& worker = *response.add_workers();
+    worker.set_id(record.id);
+    worker.set_cores(static_cast<int32_t>(record.cores));
+    worker.set_memory_bytes(record.memory_bytes);
+    worker.set_draining(record.draining || record.drained);
+    worker.set_version(record.version);
+    FillTime(record.last_heartbeat, *worker.mutable_last_seen());
+    by_id[record.id] = &worker;
+  }
+  for (v1::Attempt& attempt : RunningIn("")) {
+    const auto worker = by_id.find(attempt.worker());
+    if (worker == by_id.end()) continue;
+    worker->second->set_jobs(worker->second->jobs() + 1);
+    *worker->second->add_running() = std::move(attempt);
+  }
+  return response;
 }
 
 }  // namespace meshwright

@@ -1,7 +1,18 @@
 #include "coordinator/api/worker_logic.h"
 
+#include <cstdlib>
+#include <filesystem>
+#include <future>
+#include <mutex>
+
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "common/base/check.h"
+#include "common/base/clock.h"
+#include "common/job/job_spec_codec.h"
+#include "coordinator/store/sqlite_job_store.h"
 
 namespace meshwright {
 namespace {
@@ -17,6 +28,23 @@ v1::SynchronizeRequest Request(const std::string& worker) {
   return request;
 }
 
+// A clock that threads may read while the test moves it.
+class SharedClock : public Clock {
+ public:
+  absl::Time Now() const override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return now_;
+  }
+  void Advance(absl::Duration duration) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    now_ += duration;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  absl::Time now_ = absl::FromUnixSeconds(1'000'000'000);
+};
+
 v1::HeldJob Held(const v1::CameraJob& job) {
   v1::HeldJob held;
   *held.mutable_key() = job.key();
@@ -24,107 +52,218 @@ v1::HeldJob Held(const v1::CameraJob& job) {
   return held;
 }
 
+// Two coordinators over one store.
 class WorkerLogicTest : public testing::Test {
  protected:
   void SetUp() override {
-    logic_.AddReconstruction("a", {.options_json = "{}", .scene_digest = "digest", .sink = [this](JobOutcome outcome) {
-                                     outcomes_.push_back(std::move(outcome));
-                                   }});
+    std::string pattern = testing::TempDir() + "worker_logic_XXXXXX";
+    MW_CHECK(mkdtemp(pattern.data()) != nullptr);
+    folder_ = pattern;
+    store_ = *OpenSqliteJobStore(folder_ + "/state.sqlite", &clock_);
+    ASSERT_TRUE(
+        store_->CreateReconstruction({.id = "a", .options_json = "{}", .scene_digest = kDigest}, clock_.Now()).ok());
+    logic_ = std::make_unique<WorkerLogic>(kLease, RetryOptions{.backoff = absl::ZeroDuration()}, *store_);
+    other_ = std::make_unique<WorkerLogic>(kLease, RetryOptions{.backoff = absl::ZeroDuration()}, *store_);
   }
-  void Offer(SequenceNumber sequence, int64_t epoch) {
-    CameraJobSpec spec = {.sequence = sequence, .camera = 7, .epoch = epoch, .neighbours = {1, 2}, .targets = {2}};
+  void TearDown() override {
+    logic_.reset();
+    other_.reset();
+    store_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+  void Offer(SequenceNumber sequence, int64_t memory_bytes = 10) {
+    StoredJobSpec spec = {.targets = {2}, .memory_bytes = {memory_bytes, 5}};
     spec.accepted.push_back({.sequence = 1, .camera = 1, .digest = "d", .patches = 5});
-    logic_.Offer("a", spec, 10, absl::InfinitePast());
+    const absl::Status assigned = store_->AssignCameraJob("a",
+                                                          {.sequence = sequence,
+                                                           .camera = 6 + sequence,
+                                                           .memory_bytes = memory_bytes,
+                                                           .neighbours = {1, 2},
+                                                           .spec = EncodeJobSpec(spec)},
+                                                          clock_.Now());
+    ASSERT_TRUE(assigned.ok()) << assigned;
   }
-  v1::SynchronizeResponse Synchronize(const v1::SynchronizeRequest& request) {
-    auto response = logic_.Synchronize(request, [] { return false; });
+  static v1::SynchronizeResponse Synchronize(WorkerLogic& logic, const v1::SynchronizeRequest& request) {
+    auto response = logic.Synchronize(request, [] { return false; });
     EXPECT_TRUE(response.ok()) << response.status();
     return response.ok() ? *response : v1::SynchronizeResponse();
   }
+  v1::SynchronizeResponse Synchronize(const v1::SynchronizeRequest& request) { return Synchronize(*logic_, request); }
   std::string Refused(const v1::SynchronizeRequest& request) {
-    const auto response = logic_.Synchronize(request, [] { return false; });
+    const auto response = logic_->Synchronize(request, [] { return false; });
     EXPECT_TRUE(absl::IsInvalidArgument(response.status())) << response.status();
     return std::string(response.status().message());
   }
+  v1::SynchronizeRequest FinishedRequest(const std::string& worker, const v1::CameraJob& job,
+                                         const std::string& digest) const {
+    v1::SynchronizeRequest request = Request(worker);
+    *request.add_held() = Held(job);
+    request.mutable_held(0)->mutable_finished()->set_filtered_digest(digest);
+    request.mutable_held(0)->mutable_finished()->set_report_json("{}");
+    request.mutable_held(0)->mutable_finished()->add_weak_targets(2);
+    return request;
+  }
+  // Time goes by in small steps, so that nobody takes it for a pause of the coordinator.
+  void Pass(absl::Duration duration) {
+    for (const absl::Time end = clock_.Now() + duration; clock_.Now() < end;) {
+      clock_.Advance(absl::Seconds(5));
+      v1::SynchronizeRequest onlooker = Request("onlooker");
+      onlooker.set_draining(true);
+      Synchronize(onlooker);
+    }
+  }
+  CameraJob Stored(SequenceNumber sequence) { return *store_->GetCameraJob("a", sequence); }
 
-  ManualClock clock_;
-  std::vector<JobOutcome> outcomes_;
-  WorkerLogic logic_{{.lease = absl::Seconds(30), .job_time_limit = absl::Hours(1)}, clock_};
+  static inline const std::string kDigest = std::string(64, 'e');
+  static inline const LeaseOptions kLease = {.lease = absl::Seconds(30), .job_time_limit = absl::Hours(1)};
+  std::string folder_;
+  SharedClock clock_;
+  std::unique_ptr<JobStore> store_;
+  std::unique_ptr<WorkerLogic> logic_;
+  std::unique_ptr<WorkerLogic> other_;
 };
 
 TEST_F(WorkerLogicTest, AJobIsToldAgainUntilItsResultIsThere) {
-  Offer(3, 1);
+  Offer(1);
   const v1::SynchronizeResponse first = Synchronize(Request("w"));
   ASSERT_EQ(first.jobs_size(), 1);
   EXPECT_EQ(first.jobs(0).camera(), 7);
   EXPECT_EQ(first.jobs(0).accepted(0).digest(), "d");
-  EXPECT_EQ(first.jobs(0).scene_digest(), "digest");
-  // The answer was lost: the same again.
+  EXPECT_EQ(first.jobs(0).targets(0), 2);
+  EXPECT_EQ(first.jobs(0).options_json(), "{}");
+  // The answer was lost: the same again, also from another coordinator.
   EXPECT_EQ(Synchronize(Request("w")).SerializeAsString(), first.SerializeAsString());
+  EXPECT_EQ(Synchronize(*other_, Request("w")).SerializeAsString(), first.SerializeAsString());
 
   v1::SynchronizeRequest running = Request("w");
   *running.add_held() = Held(first.jobs(0));
-  EXPECT_EQ(Synchronize(running).jobs_size(), 1);
-  EXPECT_TRUE(outcomes_.empty());
+  const v1::SynchronizeResponse known = Synchronize(running);
+  ASSERT_EQ(known.jobs_size(), 1);
+  EXPECT_EQ(known.jobs(0).key().SerializeAsString(), first.jobs(0).key().SerializeAsString());
 
-  v1::SynchronizeRequest finished = running;
-  finished.mutable_held(0)->mutable_finished()->set_filtered_digest("f");
-  finished.mutable_held(0)->mutable_finished()->add_weak_targets(2);
+  // Its result may go to any coordinator, and twice.
+  const v1::SynchronizeRequest finished = FinishedRequest("w", first.jobs(0), kDigest);
+  EXPECT_EQ(Synchronize(*other_, finished).jobs_size(), 0);
+  EXPECT_EQ(Stored(1).state, CameraJobState::kDone);
+  EXPECT_EQ(Stored(1).filtered_digest, kDigest);
+  EXPECT_THAT(Stored(1).weak_targets, testing::ElementsAre(2));
   EXPECT_EQ(Synchronize(finished).jobs_size(), 0);
-  ASSERT_EQ(outcomes_.size(), 1);
-  EXPECT_EQ(outcomes_[0].kind, JobOutcome::Kind::kFinished);
-  EXPECT_EQ(outcomes_[0].filtered_digest, "f");
-  EXPECT_THAT(outcomes_[0].weak_targets, testing::ElementsAre(2));
-  // Told twice, counted once.
-  EXPECT_EQ(Synchronize(finished).jobs_size(), 0);
-  EXPECT_EQ(outcomes_.size(), 1);
+  EXPECT_EQ(Synchronize(FinishedRequest("w", first.jobs(0), std::string(64, 'f'))).jobs_size(), 0);
+  EXPECT_EQ(Stored(1).filtered_digest, kDigest);
+  EXPECT_EQ(store_->ListAttempts("a", 10)->size(), 1);
 }
 
 TEST_F(WorkerLogicTest, TheResultOfALostLeaseIsNotTaken) {
-  Offer(3, 1);
+  Offer(1);
   const v1::SynchronizeResponse first = Synchronize(Request("slow"));
-  clock_.Advance(absl::Seconds(31));
-  logic_.ExpireLeases();
-  ASSERT_EQ(outcomes_.size(), 1);
-  EXPECT_EQ(outcomes_[0].kind, JobOutcome::Kind::kLost);
-  Offer(3, 2);
-  EXPECT_EQ(Synchronize(Request("quick")).jobs(0).key().epoch(), 2);
-
-  v1::SynchronizeRequest late = Request("slow");
-  *late.add_held() = Held(first.jobs(0));
-  late.mutable_held(0)->mutable_finished()->set_filtered_digest("stale");
-  EXPECT_EQ(Synchronize(late).jobs_size(), 0);
-  EXPECT_EQ(outcomes_.size(), 1);
+  Pass(absl::Seconds(40));
+  EXPECT_EQ(Stored(1).losses, 1);
+  EXPECT_EQ(Synchronize(*other_, Request("quick")).jobs(0).key().epoch(), 3);
+  EXPECT_EQ(Synchronize(FinishedRequest("slow", first.jobs(0), kDigest)).jobs_size(), 0);
+  EXPECT_EQ(Stored(1).state, CameraJobState::kAssigned);
+  EXPECT_EQ(Stored(1).lease_worker, "quick");
 }
 
-TEST_F(WorkerLogicTest, WhatIsGivenBackOrFailsIsTold) {
-  Offer(1, 1);
-  v1::SynchronizeRequest request = Request("w");
-  *request.add_held() = Held(Synchronize(request).jobs(0));
-  request.mutable_held(0)->mutable_given_back();
-  request.set_draining(true);
-  EXPECT_EQ(Synchronize(request).jobs_size(), 0);
-  ASSERT_EQ(outcomes_.size(), 1);
-  EXPECT_EQ(outcomes_[0].kind, JobOutcome::Kind::kGivenBack);
+TEST_F(WorkerLogicTest, WhoIsHeardKeepsItsJob) {
+  Offer(1);
+  v1::SynchronizeRequest running = Request("w");
+  *running.add_held() = Held(Synchronize(running).jobs(0));
+  for (int i = 0; i < 10; ++i) {
+    Pass(absl::Seconds(10));
+    EXPECT_EQ(Synchronize(i % 2 == 0 ? *logic_ : *other_, running).jobs_size(), 1);
+  }
+  EXPECT_EQ(Stored(1).losses, 0);
+}
 
-  Offer(2, 1);
-  v1::SynchronizeRequest other = Request("other");
-  *other.add_held() = Held(Synchronize(other).jobs(0));
-  other.mutable_held(0)->mutable_failed()->set_reason("broken");
-  Synchronize(other);
-  ASSERT_EQ(outcomes_.size(), 2);
-  EXPECT_EQ(outcomes_[1].kind, JobOutcome::Kind::kFailed);
-  EXPECT_EQ(outcomes_[1].reason, "broken");
+TEST_F(WorkerLogicTest, WhatFailsThreeTimesIsSetAside) {
+  Offer(1);
+  std::vector<std::string> told;
+  std::mutex mutex;
+  logic_->SetListener([&](const std::string& id) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    told.push_back(id);
+  });
+  v1::SynchronizeRequest request = Request("w");
+  for (int i = 1; i <= 3; ++i) {
+    const v1::SynchronizeResponse response = Synchronize(Request("w"));
+    ASSERT_EQ(response.jobs_size(), 1) << i;
+    request.clear_held();
+    *request.add_held() = Held(response.jobs(0));
+    request.mutable_held(0)->mutable_failed()->set_reason(absl::StrCat("broken ", i));
+    request.set_draining(true);  // or it would get the job again at once
+    Synchronize(request);
+  }
+  EXPECT_EQ(Stored(1).state, CameraJobState::kSetAside);
+  EXPECT_EQ(Stored(1).set_aside_reason, "broken 3");
+  EXPECT_EQ(store_->ListAttempts("a", 10)->size(), 3);
+  const std::lock_guard<std::mutex> lock(mutex);
+  EXPECT_THAT(told, testing::ElementsAre("a"));
 }
 
 TEST_F(WorkerLogicTest, ACancelledReconstructionsJobsAreTakenAway) {
-  Offer(1, 1);
+  Offer(1);
   v1::SynchronizeRequest request = Request("w");
   *request.add_held() = Held(Synchronize(request).jobs(0));
-  logic_.RemoveReconstruction("a");
+  ASSERT_TRUE(store_->SetReconstructionState("a", ReconstructionState::kCancelled, clock_.Now()).ok());
   EXPECT_EQ(Synchronize(request).jobs_size(), 0);
-  EXPECT_TRUE(outcomes_.empty());
-  EXPECT_EQ(logic_.ListWorkers().workers_size(), 1);
+  EXPECT_EQ(logic_->ListWorkers().workers_size(), 1);
+  EXPECT_EQ(logic_->LeasesIn("a"), 0);
+}
+
+TEST_F(WorkerLogicTest, WhoWaitsIsToldOfNewWorkFromWhereverItComes) {
+  for (WorkerLogic* const waker : {logic_.get(), static_cast<WorkerLogic*>(nullptr)}) {
+    v1::SynchronizeRequest request = Request(waker == nullptr ? "v" : "w");
+    request.set_patience_seconds(20);
+    std::promise<v1::SynchronizeResponse> promise;
+    logic_->Synchronize(request, [&](absl::StatusOr<v1::SynchronizeResponse> answer) {
+      promise.set_value(answer.ok() ? *answer : v1::SynchronizeResponse());
+    });
+    Offer(waker == nullptr ? 2 : 1);
+    if (waker != nullptr) waker->Wake();
+    EXPECT_EQ(promise.get_future().get().jobs_size(), 1);
+  }
+}
+
+TEST_F(WorkerLogicTest, WhoGoesAwayWaitsForNothing) {
+  v1::SynchronizeRequest request = Request("w");
+  request.set_patience_seconds(20);
+  EXPECT_TRUE(absl::IsCancelled(logic_->Synchronize(request, [] { return true; }).status()));
+  // A second call of a worker ends the first one.
+  std::promise<absl::Status> first;
+  logic_->Synchronize(request,
+                      [&](absl::StatusOr<v1::SynchronizeResponse> answer) { first.set_value(answer.status()); });
+  EXPECT_EQ(Synchronize(Request("w")).jobs_size(), 0);
+  EXPECT_TRUE(absl::IsAborted(first.get_future().get()));
+}
+
+TEST_F(WorkerLogicTest, AJobThatFitsNobodyIsSpokenOf) {
+  Offer(1, int64_t{5} << 30);
+  Synchronize(Request("w"));
+  ASSERT_EQ(logic_->WarningsFor("a").size(), 1);
+  EXPECT_THAT(logic_->WarningsFor("a")[0], HasSubstr("camera 7 needs 5.0 GiB"));
+  EXPECT_TRUE(logic_->WarningsFor("b").empty());
+  v1::SynchronizeRequest large = Request("large");
+  large.set_memory_bytes(int64_t{6} << 30);
+  EXPECT_EQ(Synchronize(large).jobs_size(), 1);
+  EXPECT_TRUE(logic_->WarningsFor("a").empty());
+  EXPECT_EQ(logic_->RunningIn("a").size(), 1);
+}
+
+TEST_F(WorkerLogicTest, AWorkerThatRanOutOfMemoryGetsItsJobBackSmaller) {
+  Offer(1);
+  ASSERT_EQ(Synchronize(Request("w")).jobs_size(), 1);
+  v1::SynchronizeRequest again = Request("w");
+  again.set_instance("2");
+  again.set_ran_out_of_memory(true);
+  again.set_draining(true);
+  EXPECT_EQ(Synchronize(again).jobs_size(), 0);
+  again.set_draining(false);
+  again.set_ran_out_of_memory(false);
+  const v1::SynchronizeResponse smaller = Synchronize(again);
+  ASSERT_EQ(smaller.jobs_size(), 1);
+  EXPECT_EQ(smaller.jobs(0).reduction(), 1);
+  EXPECT_EQ(smaller.jobs(0).memory_bytes(), 5);
+  EXPECT_EQ(Stored(1).out_of_memory_failures, 1);
 }
 
 TEST_F(WorkerLogicTest, BadRequestsNameTheField) {

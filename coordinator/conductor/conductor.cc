@@ -7,23 +7,25 @@
 
 #include "common/base/check.h"
 #include "common/base/status_macros.h"
+#include "common/job/job_spec_codec.h"
 #include "common/surface/codec.h"
 
 namespace meshwright {
 namespace {
 
-absl::StatusOr<std::shared_ptr<const SparseSurface>> LoadSurface(BlobStore& blobs, const std::string& digest,
-                                                                 CameraIndex expected_camera) {
-  MW_ASSIGN_OR_RETURN(const std::string bytes, blobs.Get(digest));
-  MW_ASSIGN_OR_RETURN(SparseSurface surface, DecodeSparseSurface(bytes));
-  if (surface.camera_index != expected_camera) {
-    return absl::DataLossError(absl::StrCat("surface ", digest, " is of camera ", surface.camera_index,
-                                            ", expected camera ", expected_camera));
-  }
-  return std::make_shared<const SparseSurface>(std::move(surface));
-}
+// Commits that are decided quickly share one wait for the disk; none waits much longer than this for another.
+constexpr absl::Duration kWriteEvery = absl::Milliseconds(50);
 
 std::string Name(SequenceNumber sequence) { return absl::StrCat("camera job ", sequence); }
+
+absl::Status CheckWeakTargets(const Assignment& assignment, const std::vector<CameraIndex>& weak_targets) {
+  for (const CameraIndex target : weak_targets) {
+    if (std::binary_search(assignment.neighbours.begin(), assignment.neighbours.end(), target)) continue;
+    return absl::InvalidArgumentError(absl::StrCat(Name(assignment.sequence), ": weak target ", target,
+                                                   ", expected a neighbour of camera ", assignment.camera));
+  }
+  return absl::OkStatus();
+}
 
 // Keeps the `count` surfaces with the most patches, in ascending order of cameras. Ties: the lower camera.
 template <typename Surface>
@@ -51,7 +53,7 @@ absl::Status ConductorOptions::Validate() const {
 
 Conductor::Conductor(std::string reconstruction_id, const std::vector<Camera>& cameras, FeasiblePairs pairs,
                      OverlapGraph overlaps, const ConductorOptions& options, JobStore* store, BlobStore* blobs,
-                     const Clock* clock, ThreadPool* pool)
+                     const Clock* clock, ThreadPool* pool, ConductorOffice office)
     : reconstruction_id_(std::move(reconstruction_id)),
       cameras_(CameraGeometries(cameras)),
       probes_(std::move(pairs.probes)),
@@ -63,6 +65,7 @@ Conductor::Conductor(std::string reconstruction_id, const std::vector<Camera>& c
       blobs_(blobs),
       clock_(clock),
       pool_(pool),
+      office_(std::move(office)),
       schedule_(std::move(pairs.matrix), overlaps_,
                 ScheduleOptions{.window = options.window, .max_overlap_in_flight = options.acceptance.k_a}) {}
 
@@ -70,13 +73,15 @@ absl::StatusOr<std::unique_ptr<Conductor>> Conductor::Open(const std::string& re
                                                            const std::vector<Camera>& cameras,
                                                            const std::vector<SparsePoint>& points,
                                                            const ConductorOptions& options, JobStore* store,
-                                                           BlobStore* blobs, const Clock* clock, ThreadPool* pool) {
+                                                           BlobStore* blobs, const Clock* clock, ThreadPool* pool,
+                                                           ConductorOffice office) {
   MW_RETURN_IF_ERROR(options.Validate());
   MW_RETURN_IF_ERROR(store->GetReconstruction(reconstruction_id).status());
   MW_ASSIGN_OR_RETURN(FeasiblePairs pairs, FindFeasiblePairs(cameras, points, options.pairs, *pool));
   OverlapGraph overlaps = FindOverlaps(CameraGeometries(cameras), pairs.probes, pairs.matrix, options.overlap, *pool);
-  auto conductor = std::unique_ptr<Conductor>(new Conductor(reconstruction_id, cameras, std::move(pairs),
-                                                            std::move(overlaps), options, store, blobs, clock, pool));
+  auto conductor =
+      std::unique_ptr<Conductor>(new Conductor(reconstruction_id, cameras, std::move(pairs), std::move(overlaps),
+                                               options, store, blobs, clock, pool, std::move(office)));
   MW_ASSIGN_OR_RETURN(const std::vector<CameraJob> jobs, store->ListCameraJobs(reconstruction_id));
   MW_ASSIGN_OR_RETURN(const std::vector<Commit> commits, store->ListCommits(reconstruction_id));
   const std::lock_guard<std::mutex> lock(conductor->mutex_);
@@ -93,7 +98,8 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
       return absl::DataLossError(absl::StrCat("commit ", commit.sequence, " (camera ", commit.camera,
                                               ") is not what this scene and these options give"));
     }
-    const Outcome outcome = {.filtered_digest = jobs[i].filtered_digest,
+    const bool is_made_again = !jobs[i].expected_digest.empty();
+    const Outcome outcome = {.filtered_digest = is_made_again ? jobs[i].expected_digest : jobs[i].filtered_digest,
                              .weak_targets = jobs[i].weak_targets,
                              .set_aside = jobs[i].state == CameraJobState::kSetAside};
     MW_RETURN_IF_ERROR(schedule_.Commit(RecordFor(schedule_.in_flight().front(), outcome)));
@@ -102,7 +108,7 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
   for (const Assignment& assignment : schedule_.TakeChoices()) {
     const auto index = static_cast<size_t>(assignment.sequence) - 1;
     if (index >= jobs.size()) {
-      MW_RETURN_IF_ERROR(Assign(assignment));
+      Assign(assignment);
       continue;
     }
     const CameraJob& job = jobs[index];
@@ -110,6 +116,7 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
       return absl::DataLossError(
           absl::StrCat(Name(job.sequence), " (camera ", job.camera, ") is not what this scene and these options give"));
     }
+    if (job.state == CameraJobState::kAssigned && office_.epoch > 0) continue;  // it is in the store, or at a worker
     if (job.state == CameraJobState::kAssigned) {
       MW_ASSIGN_OR_RETURN(const int64_t epoch,
                           store_->ReassignCameraJob(reconstruction_id_, job.sequence, clock_->Now()));
@@ -117,16 +124,39 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
     } else {
       finished_[job.sequence] = {.filtered_digest = job.filtered_digest,
                                  .weak_targets = job.weak_targets,
-                                 .set_aside = job.state == CameraJobState::kSetAside};
+                                 .set_aside = job.state == CameraJobState::kSetAside,
+                                 .epoch = job.epoch};
     }
   }
   return CommitWhatIsNext();
 }
 
-absl::Status Conductor::Assign(const Assignment& assignment) {
-  MW_RETURN_IF_ERROR(store_->AssignCameraJob(reconstruction_id_, assignment.sequence, assignment.camera,
-                                             assignment.snapshot, clock_->Now()));
-  ready_.push_back(SpecFor(assignment, 1));
+void Conductor::Assign(const Assignment& assignment) {
+  CameraJobSpec spec = SpecFor(assignment, 1);
+  const std::vector<int64_t> bytes = office_.job_bytes ? office_.job_bytes(spec) : std::vector<int64_t>();
+  unwritten_assignments_.push_back(
+      {.sequence = spec.sequence,
+       .camera = spec.camera,
+       .snapshot = spec.snapshot,
+       .memory_bytes = bytes.empty() ? 0 : bytes.front(),
+       .neighbours = spec.neighbours,
+       .spec = EncodeJobSpec({.targets = spec.targets, .accepted = spec.accepted, .memory_bytes = bytes})});
+  if (office_.epoch == 0) ready_.push_back(std::move(spec));
+}
+
+absl::Status Conductor::Flush() {
+  if (unwritten_commits_.empty() && unwritten_assignments_.empty()) return absl::OkStatus();
+  const Progress now = CurrentProgress();
+  const StoredProgress stored = {.cameras_total = now.cameras_total,
+                                 .cameras_committed = now.cameras_committed,
+                                 .cameras_set_aside = now.cameras_set_aside,
+                                 .cameras_in_flight = now.cameras_in_flight,
+                                 .patches_filtered = now.patches_filtered,
+                                 .patches_accepted = now.patches_accepted};
+  MW_RETURN_IF_ERROR(store_->Advance(reconstruction_id_, unwritten_commits_, unwritten_assignments_, stored,
+                                     clock_->Now(), office_.epoch));
+  unwritten_commits_.clear();
+  unwritten_assignments_.clear();
   return absl::OkStatus();
 }
 
@@ -140,12 +170,7 @@ absl::Status Conductor::Complete(SequenceNumber sequence, int64_t epoch, const s
   const std::lock_guard<std::mutex> lock(mutex_);
   if (sequence <= schedule_.commits()) return absl::OkStatus();
   MW_ASSIGN_OR_RETURN(const Assignment* const assignment, FindInFlight(sequence));
-  for (const CameraIndex target : weak_targets) {
-    if (!std::binary_search(assignment->neighbours.begin(), assignment->neighbours.end(), target)) {
-      return absl::InvalidArgumentError(absl::StrCat(Name(sequence), ": weak target ", target,
-                                                     ", expected a neighbour of camera ", assignment->camera));
-    }
-  }
+  MW_RETURN_IF_ERROR(CheckWeakTargets(*assignment, weak_targets));
   MW_ASSIGN_OR_RETURN(const bool durable, blobs_->Has(filtered_digest));
   if (!durable) {
     return absl::FailedPreconditionError(
@@ -153,7 +178,7 @@ absl::Status Conductor::Complete(SequenceNumber sequence, int64_t epoch, const s
   }
   MW_RETURN_IF_ERROR(store_->CompleteCameraJob(reconstruction_id_, sequence, epoch, filtered_digest, weak_targets,
                                                report_json, clock_->Now()));
-  finished_[sequence] = {.filtered_digest = filtered_digest, .weak_targets = weak_targets, .set_aside = false};
+  finished_[sequence] = {.filtered_digest = filtered_digest, .weak_targets = weak_targets, .epoch = epoch};
   return CommitWhatIsNext();
 }
 
@@ -162,8 +187,85 @@ absl::Status Conductor::SetAside(SequenceNumber sequence, int64_t epoch, const s
   if (sequence <= schedule_.commits()) return absl::OkStatus();
   MW_RETURN_IF_ERROR(FindInFlight(sequence).status());
   MW_RETURN_IF_ERROR(store_->SetCameraJobAside(reconstruction_id_, sequence, epoch, reason, clock_->Now()));
-  finished_[sequence] = {.filtered_digest = "", .weak_targets = {}, .set_aside = true};
+  finished_[sequence] = {.set_aside = true, .epoch = epoch};
   return CommitWhatIsNext();
+}
+
+absl::StatusOr<bool> Conductor::Absorb(int max_failures) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  damaged_blob_.clear();
+  MW_ASSIGN_OR_RETURN(const std::vector<JobResult> results,
+                      store_->ListResults(reconstruction_id_, schedule_.commits()));
+  for (const JobResult& result : results) {
+    const auto known = finished_.find(result.sequence);
+    if (known != finished_.end() && known->second.epoch == result.epoch) continue;
+    MW_ASSIGN_OR_RETURN(const Assignment* const assignment, FindInFlight(result.sequence));
+    const absl::Status valid = CheckWeakTargets(*assignment, result.weak_targets);
+    bool durable = true;
+    if (valid.ok() && !result.set_aside) {
+      MW_ASSIGN_OR_RETURN(durable, blobs_->Has(result.filtered_digest));
+    }
+    if (!valid.ok() || !durable) {
+      const std::string reason = valid.ok() ? absl::StrCat("its surface ", result.filtered_digest, " is not there")
+                                            : std::string(valid.message());
+      MW_RETURN_IF_ERROR(Reject(result.sequence, result.epoch, reason, max_failures));
+      continue;
+    }
+    finished_[result.sequence] = {.filtered_digest = result.filtered_digest,
+                                  .weak_targets = result.weak_targets,
+                                  .set_aside = result.set_aside,
+                                  .epoch = result.epoch};
+  }
+  const SequenceNumber in_flight_before = schedule_.commits() + static_cast<int>(schedule_.in_flight().size());
+  const absl::Status status = CommitWhatIsNext();
+  if (absl::IsInvalidArgument(status) && !schedule_.in_flight().empty()) {
+    // The next in line is no surface.
+    const SequenceNumber sequence = schedule_.in_flight().front().sequence;
+    const int64_t epoch = finished_.at(sequence).epoch;
+    finished_.erase(sequence);
+    MW_RETURN_IF_ERROR(Reject(sequence, epoch, std::string(status.message()), max_failures));
+  } else {
+    MW_RETURN_IF_ERROR(status);
+  }
+  return schedule_.commits() + static_cast<int>(schedule_.in_flight().size()) > in_flight_before;
+}
+
+absl::Status Conductor::Reject(SequenceNumber sequence, int64_t epoch, const std::string& reason, int max_failures) {
+  MW_RETURN_IF_ERROR(
+      store_->ReopenCameraJob(reconstruction_id_, sequence, epoch, "", reason, clock_->Now(), office_.epoch));
+  MW_ASSIGN_OR_RETURN(const CameraJob job, store_->GetCameraJob(reconstruction_id_, sequence));
+  if (job.failed_attempts < max_failures) return absl::OkStatus();
+  return store_->SetCameraJobAside(reconstruction_id_, sequence, job.epoch, reason, clock_->Now());
+}
+
+std::string Conductor::damaged_blob() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return damaged_blob_;
+}
+
+absl::Status Conductor::RemakeAccepted(const std::string& accepted_digest) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  damaged_blob_.clear();
+  for (const auto& [camera, committed] : committed_) {
+    if (committed.accepted.digest != accepted_digest) continue;
+    MW_ASSIGN_OR_RETURN(const Commit again, Accept(committed.sequence, camera, committed.filtered_digest));
+    if (again.accepted_digest == accepted_digest) return absl::OkStatus();
+    return absl::FailedPreconditionError(absl::StrCat("the accepted surface ", accepted_digest, " of camera ", camera,
+                                                      " is lost, and made again it is another one, ",
+                                                      again.accepted_digest));
+  }
+  return absl::NotFoundError(absl::StrCat("no accepted surface is ", accepted_digest));
+}
+
+SequenceNumber Conductor::JobOfFiltered(const std::string& filtered_digest) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const auto& [camera, committed] : committed_) {
+    if (committed.filtered_digest == filtered_digest) return committed.sequence;
+  }
+  for (const auto& [sequence, outcome] : finished_) {
+    if (outcome.filtered_digest == filtered_digest) return sequence;
+  }
+  return 0;
 }
 
 absl::StatusOr<const Assignment*> Conductor::FindInFlight(SequenceNumber sequence) const {
@@ -174,50 +276,79 @@ absl::StatusOr<const Assignment*> Conductor::FindInFlight(SequenceNumber sequenc
 }
 
 absl::Status Conductor::CommitWhatIsNext() {
-  while (!schedule_.in_flight().empty()) {
+  absl::Time written = clock_->Now();
+  absl::Status status;
+  while (status.ok() && !schedule_.in_flight().empty()) {
     const Assignment assignment = schedule_.in_flight().front();
     const auto found = finished_.find(assignment.sequence);
     if (found == finished_.end()) break;
     const Outcome& outcome = found->second;
     Commit commit = {.sequence = assignment.sequence, .camera = assignment.camera};
     if (!outcome.set_aside) {
-      MW_ASSIGN_OR_RETURN(commit, Accept(assignment, outcome.filtered_digest));
+      absl::StatusOr<Commit> accepted = Accept(assignment.sequence, assignment.camera, outcome.filtered_digest);
+      status = accepted.status();
+      if (!status.ok()) break;
+      commit = *std::move(accepted);
     }
-    MW_RETURN_IF_ERROR(store_->AddCommit(reconstruction_id_, commit, clock_->Now()));
+    unwritten_commits_.push_back(commit);
     MW_RETURN_IF_ERROR(schedule_.Commit(RecordFor(assignment, outcome)));
     Remember(commit, outcome);
     finished_.erase(found);
-    for (const Assignment& choice : schedule_.TakeChoices()) MW_RETURN_IF_ERROR(Assign(choice));
+    for (const Assignment& choice : schedule_.TakeChoices()) Assign(choice);
+    if (clock_->Now() - written < kWriteEvery) continue;
+    MW_RETURN_IF_ERROR(Flush());
+    written = clock_->Now();
   }
-  return schedule_.finished() ? store_->SetReconstructionState(reconstruction_id_, ReconstructionState::kDone)
-                              : absl::OkStatus();
+  MW_RETURN_IF_ERROR(Flush());
+  MW_RETURN_IF_ERROR(status);
+  // With an office there is more to come than cameras: the mesh.
+  if (!schedule_.finished() || office_.epoch > 0) return absl::OkStatus();
+  return store_->SetReconstructionState(reconstruction_id_, ReconstructionState::kDone, clock_->Now());
+}
+
+absl::StatusOr<std::shared_ptr<const SparseSurface>> Conductor::LoadSurface(const std::string& digest,
+                                                                            CameraIndex expected_camera) {
+  const absl::StatusOr<std::string> bytes = blobs_->Get(digest);
+  if (absl::IsDataLoss(bytes.status()) || absl::IsNotFound(bytes.status())) damaged_blob_ = digest;
+  MW_RETURN_IF_ERROR(bytes.status());
+  absl::StatusOr<SparseSurface> surface = DecodeSparseSurface(*bytes);
+  const bool from_worker = office_.epoch > 0;
+  if (!surface.ok() || surface->camera_index != expected_camera) {
+    const std::string message = surface.ok() ? absl::StrCat("surface ", digest, " is of camera ", surface->camera_index,
+                                                            ", expected camera ", expected_camera)
+                                             : std::string(surface.status().message());
+    return from_worker ? absl::InvalidArgumentError(message) : absl::DataLossError(message);
+  }
+  return std::make_shared<const SparseSurface>(*std::move(surface));
 }
 
 // Section 3.7: what of F_r is supported by the filtered surfaces of enough cameras committed before becomes M_r.
-absl::StatusOr<Commit> Conductor::Accept(const Assignment& assignment, const std::string& filtered_digest) {
-  MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> filtered,
-                      LoadSurface(*blobs_, filtered_digest, assignment.camera));
+absl::StatusOr<Commit> Conductor::Accept(SequenceNumber sequence, CameraIndex camera,
+                                         const std::string& filtered_digest) {
+  MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> filtered, LoadSurface(filtered_digest, camera));
   struct Supporter {
     CameraIndex camera = 0;
     std::string digest;
     int64_t patches = 0;
   };
   std::vector<Supporter> supporters;
-  for (const CameraIndex other : overlaps_.Of(assignment.camera)) {
+  for (const CameraIndex other : overlaps_.Of(camera)) {
     const auto found = committed_.find(other);
-    if (found == committed_.end() || found->second.filtered_digest.empty()) continue;
+    if (found == committed_.end() || found->second.sequence >= sequence || found->second.filtered_digest.empty()) {
+      continue;
+    }
     supporters.push_back({other, found->second.filtered_digest, found->second.filtered_patches});
   }
   KeepLargest(options_.max_surfaces, supporters);
   const auto load = [&](int i) {
     const Supporter& supporter = supporters[static_cast<size_t>(i)];
-    return LoadSurface(*blobs_, supporter.digest, supporter.camera);
+    return LoadSurface(supporter.digest, supporter.camera);
   };
   MW_ASSIGN_OR_RETURN(
       const AcceptanceResult result,
       AcceptSurface(filtered->ToLattice(), static_cast<int>(supporters.size()), load, options_.acceptance, *pool_));
-  Commit commit = {.sequence = assignment.sequence,
-                   .camera = assignment.camera,
+  Commit commit = {.sequence = sequence,
+                   .camera = camera,
                    .filtered_patches = result.patches_filtered,
                    .accepted_patches = result.patches_accepted};
   if (result.patches_accepted > 0) {
@@ -227,7 +358,8 @@ absl::StatusOr<Commit> Conductor::Accept(const Assignment& assignment, const std
 }
 
 void Conductor::Remember(const Commit& commit, const Outcome& outcome) {
-  committed_[commit.camera] = {.filtered_digest = commit.filtered_patches > 0 ? outcome.filtered_digest : std::string(),
+  committed_[commit.camera] = {.sequence = commit.sequence,
+                               .filtered_digest = commit.filtered_patches > 0 ? outcome.filtered_digest : std::string(),
                                .filtered_patches = commit.filtered_patches,
                                .accepted = {.sequence = commit.sequence,
                                             .camera = commit.camera,
@@ -264,6 +396,10 @@ CameraJobSpec Conductor::SpecFor(const Assignment& assignment, int64_t epoch) co
 
 Progress Conductor::progress() const {
   const std::lock_guard<std::mutex> lock(mutex_);
+  return CurrentProgress();
+}
+
+Progress Conductor::CurrentProgress() const {
   Progress progress = progress_;
   progress.cameras_committed = schedule_.commits();
   progress.cameras_in_flight = static_cast<int>(schedule_.in_flight().size());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -17,6 +18,7 @@
 #include "common/geometry/camera.h"
 #include "common/job/camera_job_spec.h"
 #include "common/scene/scene.h"
+#include "common/surface/sparse_surface.h"
 #include "coordinator/acceptance/acceptance.h"
 #include "coordinator/incidence/feasible_pairs.h"
 #include "coordinator/incidence/overlap_graph.h"
@@ -50,6 +52,16 @@ struct Progress {
   int64_t patches_accepted = 0;
 };
 
+// Who a conductor works for.
+struct ConductorOffice {
+  // Of its lease in the store, which fences its writes; camera jobs are handed out from the store then, whoever asks
+  // there, and Absorb() looks for their results. 0: it is the only one that writes to the store, hands jobs out by
+  // TakeJobs() and is told their results by Complete().
+  int64_t epoch = 0;
+  // Bytes that a job takes at most when it is made smaller 0, 1, 2 ... times. May be empty.
+  std::function<std::vector<int64_t>(const CameraJobSpec& spec)> job_bytes;
+};
+
 // Conducts one reconstruction: which camera is processed when (schedule), what it is given (targets, accepted
 // surfaces), which of its patches are accepted (section 3.7, Jancosek et al. 2009), in the one order of the order rule.
 // Everything that has happened is in the JobStore; opening replays it, so a conductor may die at any moment. It has no
@@ -58,7 +70,8 @@ struct Progress {
 // Thread-safe: calls take a mutex. Complete() and SetAside() commit whatever has become next in line, which loads the
 // filtered surfaces of overlapping cameras one after the other (tenths of a second each on large photographs); at most
 // three surfaces are in memory. Errors of the store and the BlobStore come back as they are; after one, a conductor
-// opened anew is in order.
+// opened anew is in order, and after DataLoss or NotFound of a blob, which damaged_blob() then names, this one is too:
+// once the blob is mended, Absorb() goes on.
 class Conductor {
  public:
   // The reconstruction must exist in `store`. `store`, `blobs`, `clock` and `pool` outlive the conductor. Jobs that
@@ -68,7 +81,8 @@ class Conductor {
                                                          const std::vector<Camera>& cameras,
                                                          const std::vector<SparsePoint>& points,
                                                          const ConductorOptions& options, JobStore* store,
-                                                         BlobStore* blobs, const Clock* clock, ThreadPool* pool);
+                                                         BlobStore* blobs, const Clock* clock, ThreadPool* pool,
+                                                         ConductorOffice office = {});
 
   // Jobs that may start now and were not taken since the last commit that made them possible. Often empty.
   std::vector<CameraJobSpec> TakeJobs();
@@ -80,6 +94,17 @@ class Conductor {
                         const std::vector<CameraIndex>& weak_targets, const std::string& report_json);
   // Gives a job up: its camera contributes nothing and is nobody's target any more.
   absl::Status SetAside(SequenceNumber sequence, int64_t epoch, const std::string& reason);
+
+  // With an office: takes what has been done since the last call from the store and commits what is next. Returns
+  // whether jobs were handed out. Results that are none (weak targets that are no neighbours, a surface that is not
+  // there or cannot be decoded) are taken back, after `max_failures` of them the job is set aside.
+  absl::StatusOr<bool> Absorb(int max_failures);
+  // "" unless the last call failed since this blob is damaged or lost.
+  std::string damaged_blob() const;
+  // Makes M_r of a commit again from the filtered surfaces: the same bytes, so the blob is mended.
+  absl::Status RemakeAccepted(const std::string& accepted_digest);
+  // The committed or finished camera job whose filtered surface this is; 0 when there is none.
+  SequenceNumber JobOfFiltered(const std::string& filtered_digest) const;
 
   Progress progress() const;
   // All cameras are committed.
@@ -95,8 +120,10 @@ class Conductor {
     std::string filtered_digest;
     std::vector<CameraIndex> weak_targets;
     bool set_aside = false;
+    int64_t epoch = 0;
   };
   struct Committed {
+    SequenceNumber sequence = 0;
     std::string filtered_digest;  // "" when there is no patch in it
     int64_t filtered_patches = 0;
     AcceptedSurface accepted;  // its digest is "" when nothing was accepted
@@ -104,13 +131,18 @@ class Conductor {
 
   Conductor(std::string reconstruction_id, const std::vector<Camera>& cameras, FeasiblePairs pairs,
             OverlapGraph overlaps, const ConductorOptions& options, JobStore* store, BlobStore* blobs,
-            const Clock* clock, ThreadPool* pool);
+            const Clock* clock, ThreadPool* pool, ConductorOffice office);
 
   absl::Status Replay(const std::vector<CameraJob>& jobs, const std::vector<Commit>& commits);
-  absl::Status Assign(const Assignment& assignment);
+  void Assign(const Assignment& assignment);
+  absl::Status Flush();
+  absl::StatusOr<std::shared_ptr<const SparseSurface>> LoadSurface(const std::string& digest,
+                                                                  CameraIndex expected_camera);
+  absl::Status Reject(SequenceNumber sequence, int64_t epoch, const std::string& reason, int max_failures);
   absl::StatusOr<const Assignment*> FindInFlight(SequenceNumber sequence) const;
   absl::Status CommitWhatIsNext();
-  absl::StatusOr<Commit> Accept(const Assignment& assignment, const std::string& filtered_digest);
+  absl::StatusOr<Commit> Accept(SequenceNumber sequence, CameraIndex camera, const std::string& filtered_digest);
+  Progress CurrentProgress() const;
   void Remember(const Commit& commit, const Outcome& outcome);
   CommitRecord RecordFor(const Assignment& assignment, const Outcome& outcome) const;
   CameraJobSpec SpecFor(const Assignment& assignment, int64_t epoch) const;
@@ -126,12 +158,16 @@ class Conductor {
   BlobStore* const blobs_;
   const Clock* const clock_;
   ThreadPool* const pool_;
+  const ConductorOffice office_;
 
   mutable std::mutex mutex_;
   Schedule schedule_;
   std::vector<CameraJobSpec> ready_;            // chosen and not taken
   std::map<SequenceNumber, Outcome> finished_;  // finished and not committed
   std::map<CameraIndex, Committed> committed_;
+  std::vector<Commit> unwritten_commits_;  // decided and not in the store yet
+  std::vector<CameraAssignment> unwritten_assignments_;
+  std::string damaged_blob_;
   Progress progress_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -121,6 +122,10 @@ class ReconstructionShell final : public v1::ReconstructionService::Service {
     const absl::StatusOr<std::string> bytes = logic_.PartBytes(request->id(), request->sequence());
     return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
   }
+  grpc::Status ListAttempts(grpc::ServerContext*, const v1::ListAttemptsRequest* request,
+                            v1::ListAttemptsResponse* response) override {
+    return Answer(logic_.ListAttempts(*request), [&](const auto& value) { *response = value; });
+  }
   grpc::Status ListWorkers(grpc::ServerContext*, const v1::ListWorkersRequest*,
                            v1::ListWorkersResponse* response) override {
     *response = workers_.ListWorkers();
@@ -145,14 +150,50 @@ class ReconstructionShell final : public v1::ReconstructionService::Service {
   WorkerLogic& workers_;
 };
 
-class WorkerShell final : public v1::WorkerService::Service {
+// A call that waits for work waits without a thread of its own: the logic answers it when there is something to say.
+class WaitingWorker final : public grpc::ServerUnaryReactor {
+ public:
+  WaitingWorker(WorkerLogic& logic, const v1::SynchronizeRequest& request, v1::SynchronizeResponse& response)
+      : logic_(logic) {
+    call_ = logic_.Synchronize(request, [this, &response](absl::StatusOr<v1::SynchronizeResponse> answer) {
+      if (answer.ok()) response = *std::move(answer);
+      Finish(ToGrpc(answer.status()));
+    });
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_known_ = true;
+      if (!is_cancelled_) return;
+    }
+    logic_.Abandon(call_);
+  }
+
+  // Neither comes before the constructor has ended and both may come at any time after it; the answer, from the logic's
+  // thread, may come within it.
+  void OnCancel() override {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_cancelled_ = true;
+      if (!is_known_) return;
+    }
+    logic_.Abandon(call_);
+  }
+  void OnDone() override { delete this; }
+
+ private:
+  WorkerLogic& logic_;
+  int64_t call_ = 0;
+  std::mutex mutex_;
+  bool is_known_ = false;
+  bool is_cancelled_ = false;
+};
+
+class WorkerShell final : public v1::WorkerService::WithCallbackMethod_Synchronize<v1::WorkerService::Service> {
  public:
   WorkerShell(WorkerLogic& logic, BlobStore& blobs) : logic_(logic), blobs_(blobs) {}
 
-  grpc::Status Synchronize(grpc::ServerContext* context, const v1::SynchronizeRequest* request,
-                           v1::SynchronizeResponse* response) override {
-    return Answer(logic_.Synchronize(*request, [&] { return context->IsCancelled(); }),
-                  [&](const auto& value) { *response = value; });
+  grpc::ServerUnaryReactor* Synchronize(grpc::CallbackServerContext*, const v1::SynchronizeRequest* request,
+                                        v1::SynchronizeResponse* response) override {
+    return new WaitingWorker(logic_, *request, *response);
   }
   grpc::Status FetchBlob(grpc::ServerContext*, const v1::FetchBlobRequest* request,
                          grpc::ServerWriter<v1::FetchBlobResponse>* writer) override {

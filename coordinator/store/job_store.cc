@@ -54,4 +54,9 @@ std::string PrintableText(const std::string& text) {
   return printable;
 }
 
+bool IsFinal(ReconstructionState state) {
+  return state == ReconstructionState::kDone || state == ReconstructionState::kCancelled ||
+         state == ReconstructionState::kFailed;
+}
+
 }  // namespace meshwright

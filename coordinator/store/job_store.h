@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,16 +14,42 @@
 
 namespace meshwright {
 
-// created (its scene is still coming) -> running -> done, cancelled or failed; those three are final.
-enum class ReconstructionState { kCreated, kRunning, kDone, kCancelled, kFailed };
+// created (its scene is still coming) -> preparing -> running -> joining -> done, cancelled or failed; those three are
+// final. Deleting comes after any of them, and then nothing.
+enum class ReconstructionState { kCreated, kPreparing, kRunning, kJoining, kDone, kCancelled, kFailed, kDeleting };
+
+// How far a reconstruction is.
+struct StoredProgress {
+  int64_t cameras_total = 0;
+  int64_t cameras_committed = 0;
+  int64_t cameras_set_aside = 0;
+  int64_t cameras_in_flight = 0;
+  int64_t patches_filtered = 0;
+  int64_t patches_accepted = 0;
+
+  bool operator==(const StoredProgress&) const = default;
+};
+
+struct StoredMesh {
+  std::string digest;  // in the BlobStore; "" when there is none yet
+  int64_t bytes = 0;
+  int64_t vertices = 0;
+  int64_t faces = 0;
+};
 
 struct Reconstruction {
   std::string id;
   std::string options_json;  // everything beside the scene that the result depends on
   std::string scene_digest;  // SHA-256, 64 hexadecimal digits; empty only before it runs
   ReconstructionState state = ReconstructionState::kRunning;
-  std::string state_reason;  // why it was cancelled or failed
-  int64_t weight = 1;        // its share of the workers, relative to the others'; at least 1
+  std::string state_reason;     // why it was cancelled or failed
+  double weight = 1;            // its share of the workers, relative to the others'; at least 0.001
+  std::string scene_reference;  // "" when the scene is uploaded
+  std::string scene_blob;       // the whole scene in the BlobStore; "" until it is there
+  absl::Time created_at = absl::UnixEpoch();
+  absl::Time finished_at = absl::InfinitePast();  // in a final state only
+  StoredMesh mesh;
+  StoredProgress progress;
 };
 
 // The life of a camera job: assigned -> done -> committed, or assigned -> set aside -> committed (with no surface).
@@ -41,28 +68,50 @@ struct CameraJob {
   std::vector<CameraIndex> weak_targets;  // pairs (camera, target) to be removed from the incidence matrix
   std::string report_json;                // what the worker says about the job; set when done
   std::string set_aside_reason;
+  std::vector<CameraIndex> neighbours;  // O_r as of the snapshot
+  std::string spec;                     // what a worker needs to know (job_spec_codec); "" in lists
 
   int64_t memory_bytes = 0;  // what the job needs; 0 where nobody asks
-  // Attempts that ended badly: the worker said so, or its lease ran out. Jobs that were given back do not count.
   int64_t failed_attempts = 0;
   int64_t out_of_memory_failures = 0;  // those of them that ran out of memory
+  int64_t losses = 0;                  // attempts whose worker vanished: they say little about the job
+  int64_t reduction = 0;               // how many times it was made smaller; part of what the result depends on
+  std::string expected_digest;         // it was done before and is done again, as the blob was lost; else ""
   std::string last_failure;
   absl::Time not_before = absl::UnixEpoch();  // is not leased earlier (backoff)
   // The worker that holds it and until when; empty when nobody does, and always when the job is not assigned.
   std::string lease_worker;
+  std::string lease_instance;
+  absl::Time leased_at = absl::UnixEpoch();
   absl::Time lease_expires_at = absl::UnixEpoch();
 };
 
-// Asks for jobs that are assigned and that nobody holds (or no longer: a lease that ran out is taken over, which counts
-// as a failed attempt), of reconstructions that are running.
-struct LeaseRequest {
-  std::string worker;
-  // The reconstructions to take from, those whose turn it is first. Empty: all, the lowest sequence numbers first.
-  std::vector<std::string> reconstruction_ids;
-  int64_t memory_bytes = std::numeric_limits<int64_t>::max();  // only jobs that need at most this
-  int64_t max_jobs = 1;
-  absl::Time expires_at;
-  absl::Time now;
+// A job that is neither done nor set aside, with what has to be known to hand it out.
+struct OpenJob {
+  std::string reconstruction_id;
+  double weight = 1;  // the reconstruction's
+  SequenceNumber sequence = 0;
+  CameraIndex camera = 0;
+  int64_t epoch = 1;
+  int64_t memory_bytes = 0;
+  int64_t failed_attempts = 0;
+  int64_t losses = 0;
+  int64_t reduction = 0;
+  bool is_repair = false;  // see CameraJob::expected_digest
+  absl::Time not_before;
+  std::string lease_worker;  // "" when it waits
+  std::string lease_instance;
+  absl::Time leased_at;
+  absl::Time lease_expires_at;
+};
+
+// A job that is done or set aside.
+struct JobResult {
+  SequenceNumber sequence = 0;
+  bool set_aside = false;
+  int64_t epoch = 1;
+  std::string filtered_digest;
+  std::vector<CameraIndex> weak_targets;
 };
 
 // A camera that was chosen.
@@ -71,17 +120,57 @@ struct CameraAssignment {
   CameraIndex camera = 0;
   SequenceNumber snapshot = 0;
   int64_t memory_bytes = 0;
+  std::vector<CameraIndex> neighbours;
+  std::string spec;
 };
 
-struct CameraLease {
-  std::string reconstruction_id;
-  CameraJob job;  // with the epoch, the worker and the expiry of the lease
+// One thing that happens to one open job, named by sequence and epoch.
+struct JobChange {
+  enum class Kind {
+    kClaim,     // a job that waits is leased to the worker, in the next epoch
+    kRenew,     // the lease lasts until expires_at
+    kComplete,  // the job is done; also when the lease ran out and nobody has taken the job over
+    kSetAside,  // the job is given up with a reason
+    // The lease ends and the job waits again, at least until retry_at:
+    kRelease,  // not the job's fault, counts for nothing
+    kFail,
+    kLose,  // the worker has vanished
+  };
+  Kind kind = Kind::kClaim;
+  std::string id;  // the reconstruction's
+  SequenceNumber sequence = 0;
+  int64_t epoch = 0;
+  std::string worker;
+  std::string instance;                                    // kClaim: of the worker's process
+  absl::Time expires_at;                                   // kClaim, kRenew
+  std::string filtered_digest;                             // kComplete; the blob is durable
+  std::vector<CameraIndex> weak_targets;                   // kComplete
+  std::string report_json;                                 // kComplete
+  std::string reason;                                      // kFail, kLose, kSetAside
+  absl::Time retry_at = absl::UnixEpoch();                 // kRelease, kFail, kLose
+  bool out_of_memory = false;                              // kFail, kSetAside: it ran out of memory
+  bool reduce = false;                                     // kFail: make the job smaller from now on,
+  int64_t memory_bytes = -1;                               // so that it needs this much
+  absl::Time only_if_expired_at = absl::InfiniteFuture();  // kLose: only if the lease has run out by then
 };
 
-struct CameraJobFailure {
+struct JobChangeResult {
+  // OK, or Aborted: the job is not in this epoch, or not held by this worker, any more; drop it. InvalidArgument or
+  // FailedPrecondition: the result cannot be stored.
+  absl::Status status;
+  std::optional<CameraJob> job;  // kClaim
+};
+
+// A lease that ended.
+struct Attempt {
+  SequenceNumber sequence = 0;
+  CameraIndex camera = 0;
+  int64_t epoch = 0;
+  std::string worker;
+  absl::Time began_at;
+  absl::Time ended_at;
+  std::string ending;  // finished, failed, out_of_memory, lost or given_back
   std::string reason;
-  bool out_of_memory = false;
-  absl::Time retry_at = absl::UnixEpoch();  // nobody gets the job earlier
 };
 
 // Who conducts a reconstruction: chooses its cameras and accepts its surfaces.
@@ -91,12 +180,29 @@ struct ConductorLease {
   absl::Time expires_at = absl::UnixEpoch();
 };
 
+struct ConductedState {
+  std::string id;
+  ReconstructionState state = ReconstructionState::kRunning;
+  ConductorLease lease;  // epoch 0: nobody ever conducted it
+};
+
 struct WorkerRecord {
   std::string id;
   int64_t cores = 0;
   int64_t memory_bytes = 0;
   absl::Time last_heartbeat = absl::UnixEpoch();
-  bool drained = false;  // gets no more jobs
+  bool drained = false;  // its operator wants no more jobs for it
+  std::string instance;  // of its process
+  std::string version;
+  bool draining = false;  // it says so itself
+};
+
+struct SceneFile {
+  std::string path;  // relative to the scene's folder
+  int64_t size_bytes = 0;
+  std::string digest;  // in the BlobStore
+
+  bool operator==(const SceneFile&) const = default;
 };
 
 // One line of the only order that counts. Number s exists only when 1 .. s - 1 exist.
@@ -110,9 +216,10 @@ struct Commit {
   bool operator==(const Commit&) const = default;
 };
 
-// The memory of reconstructions: what must survive when a process dies. Each method is one durable transaction: when it
-// returns OK the change is on disk, otherwise nothing has changed (Unavailable: or perhaps it has; every method may be
-// repeated). Thread-safe. Time comes as a parameter; in a cluster it is Now(), the one clock that all have in common.
+// The memory of reconstructions: what must survive when a process dies, and what several coordinators share. Each
+// method is one durable transaction: when it returns OK the change is on disk, otherwise nothing has changed
+// (Unavailable: or perhaps it has; every method may be repeated). Thread-safe. Time comes as a parameter; in a cluster
+// it is Now(), the one clock that all have in common.
 //
 // Writes of a conductor carry its epoch (AcquireConductorLease); 0 stands for a store that only one process writes to.
 //
@@ -127,23 +234,29 @@ class JobStore {
   // The store's clock: the database's, or the process's where there is no server.
   virtual absl::StatusOr<absl::Time> Now() = 0;
 
+  // An id can be used once: AlreadyExists also after the reconstruction was deleted.
   virtual absl::Status CreateReconstruction(const Reconstruction& reconstruction, absl::Time now) = 0;
   virtual absl::StatusOr<Reconstruction> GetReconstruction(const std::string& id) = 0;
-  // By id, at most `limit` of those whose id is greater than `after`.
+  // By id, at most `limit` of those whose id is greater than `after`. Without those that are being deleted.
   virtual absl::StatusOr<std::vector<Reconstruction>> ListReconstructions(
       const std::string& after = "", int64_t limit = std::numeric_limits<int64_t>::max()) = 0;
-  // Gives a reconstruction that is only created its scene. Repeating it is OK; FailedPrecondition once it runs.
-  virtual absl::Status SetReconstructionScene(const std::string& id, const std::string& scene_digest) = 0;
+  // Gives a reconstruction that does not run yet its scene. Repeating it is OK; FailedPrecondition once it runs.
+  virtual absl::Status SetReconstructionScene(const std::string& id, const std::string& scene_digest,
+                                              const std::string& scene_blob = "", int64_t conductor_epoch = 0) = 0;
   // FailedPrecondition when it has another final state already.
-  virtual absl::Status SetReconstructionState(const std::string& id, ReconstructionState state,
+  virtual absl::Status SetReconstructionState(const std::string& id, ReconstructionState state, absl::Time now,
                                               const std::string& reason = "", int64_t conductor_epoch = 0) = 0;
-  // With its jobs and commits. Deleting what is not there is harmless.
+  // Done, with its mesh.
+  virtual absl::Status FinishReconstruction(const std::string& id, const StoredMesh& mesh, absl::Time now,
+                                            int64_t conductor_epoch = 0) = 0;
+  // From now on it is only there to be deleted. Repeating it is OK.
+  virtual absl::Status BeginDeletion(const std::string& id) = 0;
+  // Rows of it and its jobs and commits; its id stays taken. Deleting what is not there is harmless.
   virtual absl::Status DeleteReconstruction(const std::string& id) = 0;
 
   // Writes down that a camera was chosen, with epoch 1. Again with the same camera and snapshot: OK, nothing changes.
-  virtual absl::Status AssignCameraJob(const std::string& id, SequenceNumber sequence, CameraIndex camera,
-                                       SequenceNumber snapshot, absl::Time now, int64_t conductor_epoch = 0,
-                                       int64_t memory_bytes = 0) = 0;
+  virtual absl::Status AssignCameraJob(const std::string& id, const CameraAssignment& assignment, absl::Time now,
+                                       int64_t conductor_epoch = 0) = 0;
   // Hands an assigned job out again without a lease: its epoch grows by one and is returned.
   virtual absl::StatusOr<int64_t> ReassignCameraJob(const std::string& id, SequenceNumber sequence, absl::Time now) = 0;
   // The job's result; the blob must be durable already. Repeating it with the same digest is OK. A lease that ran out
@@ -155,39 +268,37 @@ class JobStore {
   // Gives the job up with a reason. Repeating it is OK; the first reason stays.
   virtual absl::Status SetCameraJobAside(const std::string& id, SequenceNumber sequence, int64_t epoch,
                                          const std::string& reason, absl::Time now) = 0;
+  // Takes a result back, so that the job is done again in a new epoch. With `expected_digest` since the blob is lost:
+  // only the same result will do, and what failed before is forgotten. With "" since the result was none: one failure
+  // more. Aborted when the job is not done in this epoch.
+  virtual absl::Status ReopenCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
+                                       const std::string& expected_digest, const std::string& reason,
+                                       absl::Time retry_at, int64_t conductor_epoch = 0) = 0;
   virtual absl::StatusOr<CameraJob> GetCameraJob(const std::string& id, SequenceNumber sequence) = 0;
-  // By sequence, those with a number greater than `after`.
+  // By sequence, those with a number greater than `after`, without their specs.
   virtual absl::StatusOr<std::vector<CameraJob>> ListCameraJobs(const std::string& id, SequenceNumber after = 0) = 0;
+  // The same, of jobs that are done or set aside.
+  virtual absl::StatusOr<std::vector<JobResult>> ListResults(const std::string& id, SequenceNumber after = 0) = 0;
 
-  // Leases at most `max_jobs` jobs; each one's epoch grows by one. Two callers never get the same job, and neither
-  // waits for the other. In the order of the request's reconstructions, then of the sequence numbers.
-  virtual absl::StatusOr<std::vector<CameraLease>> LeaseCameraJobs(const LeaseRequest& request) = 0;
-  // Aborted when the worker does not hold the job in this epoch any more. A lease that ran out can be renewed as long
-  // as nobody took the job over.
-  virtual absl::Status RenewLease(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                  const std::string& worker, absl::Time expires_at, absl::Time now) = 0;
-  // The job goes back as if nobody had held it. Repeating it is OK.
-  virtual absl::Status ReleaseLease(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                    const std::string& worker, absl::Time now) = 0;
-  // The job goes back with one failed attempt more. Repeating it is OK and counts once.
-  virtual absl::Status FailLease(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                 const std::string& worker, const CameraJobFailure& failure, absl::Time now) = 0;
-  // The same for a lease that ran out at `now`; Aborted when it was renewed meanwhile, or is held by somebody else.
-  virtual absl::Status ExpireLease(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                   const CameraJobFailure& failure, absl::Time now) = 0;
-  virtual absl::StatusOr<std::vector<CameraLease>> ListExpiredLeases(absl::Time now) = 0;
-  // Everything that a worker holds, run out or not; "" lists all workers' leases. By reconstruction and sequence.
-  virtual absl::StatusOr<std::vector<CameraLease>> ListLeases(const std::string& worker) = 0;
+  // All open jobs of all reconstructions that run, leased or not, by reconstruction and sequence.
+  virtual absl::StatusOr<std::vector<OpenJob>> ListOpenJobs() = 0;
+  // What a coordinator's turn changes, in one transaction: one wait for the disk instead of many. Each change stands
+  // by itself; two callers never claim the same job, and neither waits for the other's claim.
+  virtual absl::StatusOr<std::vector<JobChangeResult>> ApplyChanges(const std::vector<JobChange>& changes,
+                                                                    const std::vector<WorkerRecord>& heartbeats,
+                                                                    absl::Time now) = 0;
+  // The leases that ended, those that began last first. At most 16 of each job are kept.
+  virtual absl::StatusOr<std::vector<Attempt>> ListAttempts(const std::string& id, int64_t limit) = 0;
 
   // Adds commit number `commit.sequence`, which must be the next one, of a job that is done or set aside. The accepted
   // surface must be durable already. Repeating the same commit is OK.
   virtual absl::Status AddCommit(const std::string& id, const Commit& commit, absl::Time now,
                                  int64_t conductor_epoch = 0) = 0;
-  // AddCommit for each, then AssignCameraJob for each, in one transaction: one wait for the disk instead of many. When
-  // one of them is refused, those before it may stand.
+  // AddCommit for each, then AssignCameraJob for each and how far it is now, in one transaction. When one of them is
+  // refused, those before it may stand.
   virtual absl::Status Advance(const std::string& id, const std::vector<Commit>& commits,
-                               const std::vector<CameraAssignment>& assignments, absl::Time now,
-                               int64_t conductor_epoch = 0) = 0;
+                               const std::vector<CameraAssignment>& assignments, const StoredProgress& progress,
+                               absl::Time now, int64_t conductor_epoch = 0) = 0;
   // By sequence, those with a number greater than `after`.
   virtual absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after = 0) = 0;
 
@@ -201,16 +312,29 @@ class JobStore {
   // Lets others take over at once. Repeating it is OK.
   virtual absl::Status ReleaseConductorLease(const std::string& id, int64_t epoch, absl::Time now) = 0;
   virtual absl::StatusOr<ConductorLease> GetConductorLease(const std::string& id) = 0;  // NotFound before the first
-  // The running reconstructions that nobody conducts at `now`, by id.
-  virtual absl::StatusOr<std::vector<std::string>> ListUnconductedReconstructions(absl::Time now) = 0;
+  // The reconstructions that are to be conducted (or deleted), and by whom they are, by id.
+  virtual absl::StatusOr<std::vector<ConductedState>> ListConducted() = 0;
 
-  // What a worker says about itself with each heartbeat; a new worker is not drained.
-  virtual absl::Status RecordHeartbeat(const std::string& worker, int64_t cores, int64_t memory_bytes,
-                                       absl::Time now) = 0;
   virtual absl::Status SetWorkerDrained(const std::string& worker, bool drained) = 0;  // NotFound: never seen
   virtual absl::StatusOr<std::vector<WorkerRecord>> ListWorkers() = 0;                 // by id
-  // Forgets a worker. Repeating it is harmless; its leases run out by themselves.
-  virtual absl::Status RemoveWorker(const std::string& worker) = 0;
+  // Forgets workers that hold nothing and have not been heard of since `before`.
+  virtual absl::Status RemoveSilentWorkers(absl::Time before) = 0;
+
+  // An uploaded file, whose blob is durable; replaces the one of the same path.
+  virtual absl::Status PutSceneFile(const std::string& id, const SceneFile& file) = 0;
+  virtual absl::StatusOr<std::vector<SceneFile>> ListSceneFiles(const std::string& id) = 0;  // by path
+
+  // Says that a blob belongs to the reconstruction; to be called before the blob is put. False: a blob of this digest
+  // is being deleted just now, ask again before putting it. Surfaces of jobs and commits belong to it anyhow.
+  virtual absl::StatusOr<bool> HoldBlob(const std::string& id, const std::string& digest) = 0;
+  // Of a reconstruction that is being deleted: its blobs that no other one has. Who wants to hold one of them has to
+  // wait until the rows are deleted too.
+  virtual absl::StatusOr<std::vector<std::string>> LetBlobsVanish(const std::string& id) = 0;
+
+  // A blob that somebody could not read, for the conductor to look into.
+  virtual absl::Status ReportDamagedBlob(const std::string& id, const std::string& digest) = 0;
+  virtual absl::StatusOr<std::vector<std::string>> ListDamagedBlobs(const std::string& id) = 0;
+  virtual absl::Status ForgetDamagedBlob(const std::string& id, const std::string& digest) = 0;
 };
 
 // How weak targets stand in the store: numbers with commas between them, "" for none.
@@ -220,5 +344,8 @@ absl::StatusOr<std::vector<CameraIndex>> SplitCameraIndices(const std::string& t
 // Reasons come from outside, also from dying programs: "?" for every byte that is not UTF-8 text (and for NUL), so that
 // every database can hold them.
 std::string PrintableText(const std::string& text);
+
+// Whether nothing will change any more, unless it is deleted.
+bool IsFinal(ReconstructionState state);
 
 }  // namespace meshwright

@@ -32,7 +32,7 @@ class TestStore {
       store_ = *OpenSqliteJobStore(folder_ + "/state.sqlite");
     }
     MW_CHECK(store_->CreateReconstruction({"castle", "{}", std::string(64, '0')}, kNow).ok());
-    for (int s = 1; s <= kJobs; ++s) MW_CHECK(store_->AssignCameraJob("castle", s, s, 0, kNow).ok());
+    for (int s = 1; s <= kJobs; ++s) MW_CHECK(store_->AssignCameraJob("castle", {s, s, 0}, kNow).ok());
   }
   ~TestStore() {
     store_.reset();
@@ -48,21 +48,46 @@ class TestStore {
 
 std::unique_ptr<TestStore> shared_store;  // of all threads of a run
 
-// Claim one job, give it back: two durable transactions.
+// Claim some jobs, give them back: two durable transactions.
 void ClaimAndRelease(benchmark::State& state) {
   if (state.thread_index() == 0) shared_store = std::make_unique<TestStore>(state.range(0) == 1);
   const std::string worker = absl::StrCat("worker", state.thread_index());
+  const auto jobs = static_cast<int>(state.range(1));
+  const int first = 1 + state.thread_index() * jobs;
+  int64_t epoch = 1;
   for (auto _ : state) {
-    const auto leases =
-        (**shared_store).LeaseCameraJobs({.worker = worker, .expires_at = kNow + absl::Seconds(30), .now = kNow});
-    MW_CHECK(leases.ok() && leases->size() == 1);
-    const CameraJob& job = leases->front().job;
-    MW_CHECK((**shared_store).ReleaseLease("castle", job.sequence, job.epoch, worker, kNow).ok());
+    std::vector<JobChange> changes;
+    for (int s = first; s < first + jobs; ++s) {
+      changes.push_back({.kind = JobChange::Kind::kClaim,
+                         .id = "castle",
+                         .sequence = s,
+                         .epoch = epoch,
+                         .worker = worker,
+                         .expires_at = kNow + absl::Seconds(30)});
+    }
+    ++epoch;
+    MW_CHECK((**shared_store).ApplyChanges(changes, {}, kNow)->back().status.ok());
+    for (JobChange& change : changes) {
+      change.kind = JobChange::Kind::kRelease;
+      change.epoch = epoch;
+    }
+    MW_CHECK((**shared_store).ApplyChanges(changes, {}, kNow)->back().status.ok());
   }
-  state.SetItemsProcessed(state.iterations());
+  state.SetItemsProcessed(state.iterations() * jobs);
   if (state.thread_index() == 0) shared_store.reset();
 }
-BENCHMARK(ClaimAndRelease)->ArgName("postgres")->Arg(0)->Arg(1)->ThreadRange(1, 8)->UseRealTime();
+BENCHMARK(ClaimAndRelease)
+    ->ArgNames({"postgres", "jobs"})
+    ->ArgsProduct({{0, 1}, {1, 20}})
+    ->ThreadRange(1, 8)
+    ->UseRealTime();
+
+// What every turn of a coordinator reads, with 200 jobs open.
+void ListOpenJobs(benchmark::State& state) {
+  TestStore store(state.range(0) == 1);
+  for (auto _ : state) MW_CHECK((*store).ListOpenJobs()->size() == kJobs);
+}
+BENCHMARK(ListOpenJobs)->ArgName("postgres")->Arg(0)->Arg(1)->UseRealTime();
 
 // What one camera job costs the store from end to end: assigned, claimed, completed, committed.
 void WholeLife(benchmark::State& state) {
@@ -71,14 +96,18 @@ void WholeLife(benchmark::State& state) {
   SequenceNumber s = 0;
   for (auto _ : state) {
     ++s;
-    MW_CHECK((*store).AssignCameraJob("abbey", s, s, 0, kNow).ok());
-    const auto leases = (*store).LeaseCameraJobs(
-        {.worker = "w", .reconstruction_ids = {"abbey"}, .expires_at = kNow + absl::Seconds(30), .now = kNow});
-    MW_CHECK(leases.ok() && leases->size() == 1);
-    MW_CHECK(
-        (*store)
-            .CompleteCameraJob("abbey", s, leases->front().job.epoch, std::string(64, 'a'), {}, R"({"seeds":9})", kNow)
-            .ok());
+    MW_CHECK((*store).AssignCameraJob("abbey", {s, s, 0}, kNow).ok());
+    MW_CHECK((*store)
+                 .ApplyChanges({{.kind = JobChange::Kind::kClaim,
+                                 .id = "abbey",
+                                 .sequence = s,
+                                 .epoch = 1,
+                                 .worker = "w",
+                                 .expires_at = kNow + absl::Seconds(30)}},
+                               {}, kNow)
+                 ->front()
+                 .status.ok());
+    MW_CHECK((*store).CompleteCameraJob("abbey", s, 2, std::string(64, 'a'), {}, R"({"seeds":9})", kNow).ok());
     MW_CHECK((*store).AddCommit("abbey", {s, s, std::string(64, 'b'), 9, 4}, kNow).ok());
   }
   state.SetItemsProcessed(state.iterations());

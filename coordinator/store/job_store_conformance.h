@@ -46,21 +46,40 @@ class JobStoreConformance : public testing::TestWithParam<JobStoreFactory> {
 
   // Cameras 1 .. count as jobs 1 .. count.
   void AssignJobs(const std::string& id, int count) {
-    for (int s = 1; s <= count; ++s) ASSERT_TRUE(store().AssignCameraJob(id, s, s, 0, kNow).ok());
+    for (int s = 1; s <= count; ++s) ASSERT_TRUE(store().AssignCameraJob(id, {s, s, 0}, kNow).ok());
   }
 
-  static LeaseRequest RequestOf(const std::string& worker, absl::Time now = kNow) {
-    return {.worker = worker, .expires_at = now + kLease, .now = now};
+  // A change of castle's job `sequence` as `worker` would make it.
+  static JobChange ChangeOf(JobChange::Kind kind, SequenceNumber sequence, int64_t epoch, const std::string& worker) {
+    return {.kind = kind,
+            .id = "castle",
+            .sequence = sequence,
+            .epoch = epoch,
+            .worker = worker,
+            .instance = "1",
+            .expires_at = kNow + kLease};
   }
-
-  // "reconstruction/sequence" of each.
-  static std::vector<std::string> Names(const absl::StatusOr<std::vector<CameraLease>>& leases) {
-    if (!leases.ok()) return {leases.status().ToString()};
-    std::vector<std::string> names;
-    for (const CameraLease& lease : *leases) {
-      names.push_back(lease.reconstruction_id + "/" + std::to_string(lease.job.sequence));
-    }
-    return names;
+  JobChangeResult Apply(const JobChange& change, absl::Time now = kNow) {
+    const auto results = store().ApplyChanges({change}, {}, now);
+    if (!results.ok()) return {.status = results.status()};
+    return results->front();
+  }
+  JobChangeResult Claim(SequenceNumber sequence, int64_t epoch, const std::string& worker, absl::Time now = kNow) {
+    JobChange change = ChangeOf(JobChange::Kind::kClaim, sequence, epoch, worker);
+    change.expires_at = now + kLease;
+    return Apply(change, now);
+  }
+  absl::Status End(JobChange::Kind kind, SequenceNumber sequence, int64_t epoch, const std::string& worker,
+                   const std::string& reason = "") {
+    JobChange change = ChangeOf(kind, sequence, epoch, worker);
+    change.reason = reason;
+    return Apply(change).status;
+  }
+  absl::Status Complete(SequenceNumber sequence, int64_t epoch, const std::string& digest) {
+    JobChange change = ChangeOf(JobChange::Kind::kComplete, sequence, epoch, "");
+    change.filtered_digest = digest;
+    change.report_json = "{}";
+    return Apply(change).status;
   }
 
   static constexpr absl::Duration kLease = absl::Seconds(30);
@@ -79,7 +98,7 @@ TEST_P(JobStoreConformance, ReconstructionsSurviveReopening) {
   EXPECT_EQ(stored->scene_digest, kReconstruction.scene_digest);
   EXPECT_EQ(stored->state, ReconstructionState::kRunning);
 
-  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kDone).ok());
+  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kDone, kNow).ok());
   Reopen();
   EXPECT_EQ(store().GetReconstruction("castle")->state, ReconstructionState::kDone);
 }
@@ -99,8 +118,8 @@ TEST_P(JobStoreConformance, ReconstructionIdsAreUnique) {
 
 TEST_P(JobStoreConformance, UnknownReconstructionsAreNotFound) {
   EXPECT_TRUE(absl::IsNotFound(store().GetReconstruction("ruin").status()));
-  EXPECT_TRUE(absl::IsNotFound(store().SetReconstructionState("ruin", ReconstructionState::kDone)));
-  EXPECT_FALSE(store().AssignCameraJob("ruin", 1, 0, 0, kNow).ok());
+  EXPECT_TRUE(absl::IsNotFound(store().SetReconstructionState("ruin", ReconstructionState::kDone, kNow)));
+  EXPECT_FALSE(store().AssignCameraJob("ruin", {1, 0, 0}, kNow).ok());
   EXPECT_TRUE(absl::IsNotFound(store().CompleteCameraJob("ruin", 1, 1, Digest('a'), {}, "{}", kNow)));
 }
 
@@ -108,10 +127,10 @@ TEST_P(JobStoreConformance, ValuesThatBreakAnInvariantAreRefused) {
   EXPECT_FALSE(store().CreateReconstruction({"", "{}", Digest('1')}, kNow).ok());
   EXPECT_FALSE(store().CreateReconstruction({"x", "not json", Digest('1')}, kNow).ok());
   EXPECT_FALSE(store().CreateReconstruction({"x", "{}", "short"}, kNow).ok());
-  EXPECT_FALSE(store().AssignCameraJob("castle", 0, 1, 0, kNow).ok());   // sequences begin at 1
-  EXPECT_FALSE(store().AssignCameraJob("castle", 1, -1, 0, kNow).ok());  // no such camera
-  EXPECT_FALSE(store().AssignCameraJob("castle", 2, 1, 2, kNow).ok());   // sees itself
-  ASSERT_TRUE(store().AssignCameraJob("castle", 1, 4, 0, kNow).ok());
+  EXPECT_FALSE(store().AssignCameraJob("castle", {0, 1, 0}, kNow).ok());   // sequences begin at 1
+  EXPECT_FALSE(store().AssignCameraJob("castle", {1, -1, 0}, kNow).ok());  // no such camera
+  EXPECT_FALSE(store().AssignCameraJob("castle", {2, 1, 2}, kNow).ok());   // sees itself
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 4, 0}, kNow).ok());
   EXPECT_FALSE(store().CompleteCameraJob("castle", 1, 1, "short", {}, "{}", kNow).ok());
   EXPECT_FALSE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "not json", kNow).ok());
   ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
@@ -122,10 +141,10 @@ TEST_P(JobStoreConformance, ValuesThatBreakAnInvariantAreRefused) {
 }
 
 TEST_P(JobStoreConformance, AssignmentsAreIdempotentAndContradictionsRefused) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", 1, 7, 0, kNow).ok());
-  EXPECT_TRUE(store().AssignCameraJob("castle", 1, 7, 0, kNow).ok());
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().AssignCameraJob("castle", 1, 8, 0, kNow)));
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().AssignCameraJob("castle", 2, 7, 0, kNow)));  // one job a camera
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
+  EXPECT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(store().AssignCameraJob("castle", {1, 8, 0}, kNow)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(store().AssignCameraJob("castle", {2, 7, 0}, kNow)));  // one job a camera
   const auto jobs = store().ListCameraJobs("castle");
   ASSERT_EQ(jobs->size(), 1);
   EXPECT_EQ(jobs->at(0).camera, 7);
@@ -134,8 +153,8 @@ TEST_P(JobStoreConformance, AssignmentsAreIdempotentAndContradictionsRefused) {
 }
 
 TEST_P(JobStoreConformance, ResultsSurviveReopening) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", 1, 7, 0, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("castle", 2, 3, 0, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {2, 3, 0}, kNow).ok());
   ASSERT_TRUE(store().CompleteCameraJob("castle", 2, 1, Digest('a'), {4, 11}, R"({"seeds":9})", kNow).ok());
   ASSERT_TRUE(store().SetCameraJobAside("castle", 1, 1, "picture is gone", kNow).ok());
   Reopen();
@@ -151,7 +170,7 @@ TEST_P(JobStoreConformance, ResultsSurviveReopening) {
 }
 
 TEST_P(JobStoreConformance, AnOldEpochMayNotWrite) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", 1, 7, 0, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
   const auto epoch = store().ReassignCameraJob("castle", 1, kNow);
   ASSERT_TRUE(epoch.ok()) << epoch.status();
   EXPECT_EQ(*epoch, 2);
@@ -166,7 +185,7 @@ TEST_P(JobStoreConformance, AnOldEpochMayNotWrite) {
 }
 
 TEST_P(JobStoreConformance, RepeatedResultsAreHarmless) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", 1, 7, 0, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
   ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
   EXPECT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
   EXPECT_TRUE(absl::IsFailedPrecondition(store().CompleteCameraJob("castle", 1, 1, Digest('b'), {}, "{}", kNow)));
@@ -174,8 +193,8 @@ TEST_P(JobStoreConformance, RepeatedResultsAreHarmless) {
 }
 
 TEST_P(JobStoreConformance, CommitsComeInOrderOnceAndOfFinishedJobs) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", 1, 7, 0, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("castle", 2, 3, 0, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {2, 3, 0}, kNow).ok());
   ASSERT_TRUE(store().CompleteCameraJob("castle", 2, 1, Digest('a'), {}, "{}", kNow).ok());
   const Commit first = {1, 7, "", 0, 0};
   const Commit second = {2, 3, Digest('b'), 9, 4};
@@ -194,8 +213,8 @@ TEST_P(JobStoreConformance, CommitsComeInOrderOnceAndOfFinishedJobs) {
 
 TEST_P(JobStoreConformance, ReconstructionsDoNotSeeEachOther) {
   ASSERT_TRUE(store().CreateReconstruction({"abbey", "{}", Digest('1')}, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("abbey", 1, 2, 0, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("castle", 1, 7, 0, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("abbey", {1, 2, 0}, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
   EXPECT_EQ(store().ListCameraJobs("abbey")->at(0).camera, 2);
   EXPECT_EQ(store().ListCameraJobs("castle")->at(0).camera, 7);
 }
@@ -203,7 +222,7 @@ TEST_P(JobStoreConformance, ReconstructionsDoNotSeeEachOther) {
 TEST_P(JobStoreConformance, ManyThreadsGetOneWinnerEach) {
   constexpr int kJobs = 8;
   constexpr int kThreads = 4;
-  for (int s = 1; s <= kJobs; ++s) ASSERT_TRUE(store().AssignCameraJob("castle", s, s, 0, kNow).ok());
+  for (int s = 1; s <= kJobs; ++s) ASSERT_TRUE(store().AssignCameraJob("castle", {s, s, 0}, kNow).ok());
   std::vector<int> won(kThreads, 0);
   std::vector<std::thread> threads;
   threads.reserve(kThreads);
@@ -230,161 +249,223 @@ TEST_P(JobStoreConformance, TheStoreHasAClock) {
 }
 
 TEST_P(JobStoreConformance, AJobIsLeasedToOneWorkerInANewEpoch) {
-  AssignJobs("castle", 2);
-  const auto leases = store().LeaseCameraJobs(RequestOf("ant"));
-  ASSERT_TRUE(leases.ok()) << leases.status();
-  ASSERT_EQ(leases->size(), 1);
-  EXPECT_EQ(leases->at(0).reconstruction_id, "castle");
-  EXPECT_EQ(leases->at(0).job.sequence, 1);
-  EXPECT_EQ(leases->at(0).job.camera, 1);
-  EXPECT_EQ(leases->at(0).job.epoch, 2);
-  EXPECT_EQ(leases->at(0).job.lease_worker, "ant");
-  EXPECT_EQ(leases->at(0).job.lease_expires_at, kNow + kLease);
-  EXPECT_EQ(store().LeaseCameraJobs(RequestOf("bee"))->at(0).job.sequence, 2);
-  EXPECT_TRUE(store().LeaseCameraJobs(RequestOf("cat"))->empty());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0, 5, {2, 9}, "what to do"}, kNow).ok());
+  const JobChangeResult claimed = Claim(1, 1, "ant");
+  ASSERT_TRUE(claimed.status.ok() && claimed.job.has_value()) << claimed.status;
+  EXPECT_EQ(claimed.job->epoch, 2);
+  EXPECT_EQ(claimed.job->camera, 7);
+  EXPECT_EQ(claimed.job->spec, "what to do");
+  EXPECT_THAT(claimed.job->neighbours, testing::ElementsAre(2, 9));
+  EXPECT_EQ(claimed.job->lease_worker, "ant");
+  EXPECT_EQ(claimed.job->lease_instance, "1");
+  EXPECT_EQ(claimed.job->leased_at, kNow);
+  EXPECT_EQ(claimed.job->lease_expires_at, kNow + kLease);
+  EXPECT_TRUE(absl::IsAborted(Claim(1, 1, "bee").status));
+  EXPECT_TRUE(absl::IsAborted(Claim(1, 2, "bee").status));
   Reopen();
-  EXPECT_TRUE(store().LeaseCameraJobs(RequestOf("cat"))->empty());
-  EXPECT_TRUE(absl::IsAborted(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow)));
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 2, Digest('a'), {}, "{}", kNow).ok());
+  EXPECT_TRUE(absl::IsAborted(Claim(1, 2, "bee").status));
+  EXPECT_TRUE(absl::IsAborted(Complete(1, 1, Digest('a'))));
+  EXPECT_TRUE(Complete(1, 2, Digest('a')).ok());
   EXPECT_EQ(store().GetCameraJob("castle", 1)->lease_worker, "");
-  ASSERT_TRUE(store().SetCameraJobAside("castle", 2, 2, "gone", kNow).ok());
-  EXPECT_TRUE(store().ListLeases("")->empty());
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->spec, "what to do");
+  EXPECT_TRUE(store().ListOpenJobs()->empty());
 }
 
-TEST_P(JobStoreConformance, LeasesNeedAWorkerAndTime) {
-  AssignJobs("castle", 1);
-  EXPECT_TRUE(absl::IsInvalidArgument(store().LeaseCameraJobs(RequestOf("")).status()));
-  EXPECT_TRUE(
-      absl::IsInvalidArgument(store().LeaseCameraJobs({.worker = "ant", .expires_at = kNow, .now = kNow}).status()));
-}
-
-TEST_P(JobStoreConformance, ReconstructionsTakeTurnsAsTheRequestSays) {
-  for (const char* id : {"abbey", "barn"}) {
-    ASSERT_TRUE(store().CreateReconstruction({id, "{}", Digest('1')}, kNow).ok());
-    AssignJobs(id, 2);
-  }
-  AssignJobs("castle", 2);
-  LeaseRequest request = RequestOf("ant");
-  request.reconstruction_ids = {"castle", "ruin", "abbey", "castle"};
-  request.max_jobs = 3;
-  EXPECT_THAT(Names(store().LeaseCameraJobs(request)), testing::ElementsAre("castle/1", "castle/2", "abbey/1"));
-  EXPECT_THAT(Names(store().LeaseCameraJobs(request)), testing::ElementsAre("abbey/2"));
-  request.reconstruction_ids.clear();
-  EXPECT_THAT(Names(store().LeaseCameraJobs(request)), testing::ElementsAre("barn/1", "barn/2"));
-}
-
-TEST_P(JobStoreConformance, WithoutTurnsTheLowestSequenceNumbersComeFirst) {
-  ASSERT_TRUE(store().CreateReconstruction({"abbey", "{}", Digest('1')}, kNow).ok());
-  AssignJobs("castle", 2);
-  AssignJobs("abbey", 2);
-  LeaseRequest request = RequestOf("ant");
-  request.max_jobs = 10;
-  EXPECT_THAT(Names(store().LeaseCameraJobs(request)),
-              testing::ElementsAre("abbey/1", "castle/1", "abbey/2", "castle/2"));
-}
-
-TEST_P(JobStoreConformance, OnlyJobsThatFitAreLeased) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", 1, 1, 0, kNow, 0, 5'000'000'000).ok());
-  ASSERT_TRUE(store().AssignCameraJob("castle", 2, 2, 0, kNow, 0, 3'000'000'000).ok());
-  LeaseRequest request = RequestOf("small");
-  request.memory_bytes = 4'000'000'000;
-  request.max_jobs = 2;
-  EXPECT_THAT(Names(store().LeaseCameraJobs(request)), testing::ElementsAre("castle/2"));
-  request.memory_bytes = 5'000'000'000;
-  EXPECT_THAT(Names(store().LeaseCameraJobs(request)), testing::ElementsAre("castle/1"));
-  EXPECT_EQ(store().GetCameraJob("castle", 1)->memory_bytes, 5'000'000'000);
-}
-
-TEST_P(JobStoreConformance, OnlyRunningReconstructionsHandOutJobs) {
-  AssignJobs("castle", 1);
-  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kCancelled, "by its owner").ok());
-  EXPECT_TRUE(store().LeaseCameraJobs(RequestOf("ant"))->empty());
+TEST_P(JobStoreConformance, OpenJobsAreThoseOfReconstructionsThatRun) {
+  ASSERT_TRUE(
+      store()
+          .CreateReconstruction({.id = "abbey", .options_json = "{}", .scene_digest = Digest('1'), .weight = 2.5}, kNow)
+          .ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0, 5'000'000'000}, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {2, 3, 0}, kNow).ok());
+  ASSERT_TRUE(store().AssignCameraJob("abbey", {1, 4, 0}, kNow).ok());
+  ASSERT_TRUE(Claim(2, 1, "ant").status.ok());
+  const auto open = store().ListOpenJobs();
+  ASSERT_TRUE(open.ok()) << open.status();
+  ASSERT_EQ(open->size(), 3);
+  EXPECT_EQ(open->at(0).reconstruction_id, "abbey");
+  EXPECT_EQ(open->at(0).weight, 2.5);
+  EXPECT_EQ(open->at(1).camera, 7);
+  EXPECT_EQ(open->at(1).memory_bytes, 5'000'000'000);
+  EXPECT_EQ(open->at(1).lease_worker, "");
+  EXPECT_EQ(open->at(2).lease_worker, "ant");
+  EXPECT_EQ(open->at(2).lease_expires_at, kNow + kLease);
+  EXPECT_EQ(open->at(2).epoch, 2);
+  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kCancelled, kNow, "by its owner").ok());
+  ASSERT_EQ(store().ListOpenJobs()->size(), 1);
 }
 
 TEST_P(JobStoreConformance, OnlyTheHolderRenews) {
   AssignJobs("castle", 1);
-  ASSERT_TRUE(store().LeaseCameraJobs(RequestOf("ant")).ok());
-  EXPECT_TRUE(store().RenewLease("castle", 1, 2, "ant", kNow + 2 * kLease, kNow).ok());
+  ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
+  JobChange renewal = ChangeOf(JobChange::Kind::kRenew, 1, 2, "ant");
+  renewal.expires_at = kNow + 2 * kLease;
+  EXPECT_TRUE(Apply(renewal).status.ok());
   EXPECT_EQ(store().GetCameraJob("castle", 1)->lease_expires_at, kNow + 2 * kLease);
-  EXPECT_TRUE(absl::IsAborted(store().RenewLease("castle", 1, 1, "ant", kNow + 2 * kLease, kNow)));
-  EXPECT_TRUE(absl::IsAborted(store().RenewLease("castle", 1, 2, "bee", kNow + 2 * kLease, kNow)));
-  EXPECT_TRUE(absl::IsNotFound(store().RenewLease("castle", 9, 2, "ant", kNow + 2 * kLease, kNow)));
-  // Run out, but nobody took it over: still the holder's.
-  EXPECT_TRUE(store().RenewLease("castle", 1, 2, "ant", kNow + 9 * kLease, kNow + 5 * kLease).ok());
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 2, Digest('a'), {}, "{}", kNow).ok());
-  EXPECT_TRUE(absl::IsAborted(store().RenewLease("castle", 1, 2, "ant", kNow + 9 * kLease, kNow)));
-}
-
-TEST_P(JobStoreConformance, ALeaseThatRanOutIsTakenOverAndCountsAsAFailure) {
-  AssignJobs("castle", 1);
-  ASSERT_TRUE(store().LeaseCameraJobs(RequestOf("ant")).ok());
-  EXPECT_TRUE(store().ListExpiredLeases(kNow + kLease - absl::Microseconds(1))->empty());
-  EXPECT_THAT(Names(store().ListExpiredLeases(kNow + kLease)), testing::ElementsAre("castle/1"));
-  const auto taken = store().LeaseCameraJobs(RequestOf("bee", kNow + kLease));
-  ASSERT_EQ(taken->size(), 1);
-  EXPECT_EQ(taken->at(0).job.epoch, 3);
-  EXPECT_EQ(taken->at(0).job.failed_attempts, 1);
-  EXPECT_THAT(taken->at(0).job.last_failure, testing::HasSubstr("ant"));
-  // The old worker comes back with a stale result.
-  EXPECT_TRUE(absl::IsAborted(store().RenewLease("castle", 1, 2, "ant", kNow + 9 * kLease, kNow)));
-  EXPECT_TRUE(absl::IsAborted(store().CompleteCameraJob("castle", 1, 2, Digest('a'), {}, "{}", kNow)));
-  EXPECT_TRUE(absl::IsAborted(store().ReleaseLease("castle", 1, 2, "ant", kNow)));
-  EXPECT_TRUE(absl::IsAborted(store().FailLease("castle", 1, 2, "ant", {"crash"}, kNow)));
-  EXPECT_TRUE(absl::IsAborted(store().ExpireLease("castle", 1, 2, {"ran out"}, kNow + 9 * kLease)));
-  EXPECT_EQ(store().GetCameraJob("castle", 1)->lease_worker, "bee");
+  renewal.epoch = 1;
+  EXPECT_TRUE(absl::IsAborted(Apply(renewal).status));
+  renewal.epoch = 2;
+  renewal.worker = "bee";
+  EXPECT_TRUE(absl::IsAborted(Apply(renewal).status));
+  renewal.sequence = 9;
+  EXPECT_TRUE(absl::IsAborted(Apply(renewal).status));
 }
 
 TEST_P(JobStoreConformance, AReleasedJobGoesBackWithoutAFailure) {
   AssignJobs("castle", 1);
-  ASSERT_TRUE(store().LeaseCameraJobs(RequestOf("ant")).ok());
-  EXPECT_TRUE(absl::IsAborted(store().ReleaseLease("castle", 1, 2, "bee", kNow)));
-  EXPECT_TRUE(store().ReleaseLease("castle", 1, 2, "ant", kNow).ok());
-  EXPECT_TRUE(store().ReleaseLease("castle", 1, 2, "ant", kNow).ok());
-  const auto again = store().LeaseCameraJobs(RequestOf("bee"));
-  ASSERT_EQ(again->size(), 1);
-  EXPECT_EQ(again->at(0).job.failed_attempts, 0);
-  EXPECT_EQ(again->at(0).job.epoch, 3);
+  ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
+  EXPECT_TRUE(absl::IsAborted(End(JobChange::Kind::kRelease, 1, 2, "bee")));
+  EXPECT_TRUE(End(JobChange::Kind::kRelease, 1, 2, "ant").ok());
+  EXPECT_TRUE(absl::IsAborted(End(JobChange::Kind::kRelease, 1, 2, "ant")));
+  const JobChangeResult again = Claim(1, 2, "bee");
+  ASSERT_TRUE(again.job.has_value());
+  EXPECT_EQ(again.job->failed_attempts, 0);
+  EXPECT_EQ(again.job->losses, 0);
+  EXPECT_EQ(again.job->epoch, 3);
 }
 
 TEST_P(JobStoreConformance, AFailedJobWaitsAndCounts) {
   AssignJobs("castle", 1);
-  ASSERT_TRUE(store().LeaseCameraJobs(RequestOf("ant")).ok());
-  const CameraJobFailure failure = {"ended with 137\xff", true, kNow + absl::Seconds(5)};
-  EXPECT_TRUE(absl::IsAborted(store().FailLease("castle", 1, 2, "bee", failure, kNow)));
-  EXPECT_TRUE(store().FailLease("castle", 1, 2, "ant", failure, kNow).ok());
-  EXPECT_TRUE(store().FailLease("castle", 1, 2, "ant", failure, kNow).ok());
-  EXPECT_TRUE(store().LeaseCameraJobs(RequestOf("ant", kNow + absl::Seconds(4)))->empty());
-  const auto again = store().LeaseCameraJobs(RequestOf("ant", kNow + absl::Seconds(5)));
-  ASSERT_EQ(again->size(), 1);
-  EXPECT_EQ(again->at(0).job.failed_attempts, 1);
-  EXPECT_EQ(again->at(0).job.out_of_memory_failures, 1);
-  EXPECT_EQ(again->at(0).job.last_failure, "ended with 137?");
-  EXPECT_EQ(again->at(0).job.not_before, kNow + absl::Seconds(5));
+  ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
+  JobChange failure = ChangeOf(JobChange::Kind::kFail, 1, 2, "ant");
+  failure.reason = "ended with 137\xff";
+  failure.out_of_memory = true;
+  failure.reduce = true;
+  failure.memory_bytes = 77;
+  failure.retry_at = kNow + absl::Seconds(5);
+  EXPECT_TRUE(Apply(failure).status.ok());
+  EXPECT_TRUE(absl::IsAborted(Apply(failure).status));  // counts once
+  const CameraJob job = *store().GetCameraJob("castle", 1);
+  EXPECT_EQ(job.failed_attempts, 1);
+  EXPECT_EQ(job.out_of_memory_failures, 1);
+  EXPECT_EQ(job.reduction, 1);
+  EXPECT_EQ(job.memory_bytes, 77);
+  EXPECT_EQ(job.last_failure, "ended with 137?");
+  EXPECT_EQ(store().ListOpenJobs()->at(0).not_before, kNow + absl::Seconds(5));
+  EXPECT_EQ(store().ListOpenJobs()->at(0).failed_attempts, 1);
+  EXPECT_EQ(store().ListOpenJobs()->at(0).reduction, 1);
 }
 
-TEST_P(JobStoreConformance, OnlyALeaseThatRanOutExpires) {
+TEST_P(JobStoreConformance, OnlyALeaseThatRanOutIsTakenAway) {
   AssignJobs("castle", 1);
-  ASSERT_TRUE(store().LeaseCameraJobs(RequestOf("ant")).ok());
-  EXPECT_TRUE(absl::IsAborted(store().ExpireLease("castle", 1, 2, {"silent"}, kNow + kLease / 2)));
-  EXPECT_TRUE(store().ExpireLease("castle", 1, 2, {"silent"}, kNow + kLease).ok());
-  EXPECT_TRUE(store().ExpireLease("castle", 1, 2, {"silent"}, kNow + kLease).ok());
-  EXPECT_TRUE(store().ListExpiredLeases(kNow + 9 * kLease)->empty());
-  EXPECT_EQ(store().GetCameraJob("castle", 1)->failed_attempts, 1);
+  ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
+  JobChange loss = ChangeOf(JobChange::Kind::kLose, 1, 2, "ant");
+  loss.reason = "silent";
+  loss.only_if_expired_at = kNow + kLease / 2;
+  EXPECT_TRUE(absl::IsAborted(Apply(loss).status));
+  loss.only_if_expired_at = kNow + kLease;
+  EXPECT_TRUE(Apply(loss).status.ok());
+  EXPECT_TRUE(absl::IsAborted(Apply(loss).status));
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->losses, 1);
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->failed_attempts, 0);
   EXPECT_EQ(store().GetCameraJob("castle", 1)->last_failure, "silent");
-  // Nobody has taken it over: a late result is welcome.
-  EXPECT_TRUE(store().CompleteCameraJob("castle", 1, 2, Digest('a'), {}, "{}", kNow).ok());
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().ExpireLease("castle", 1, 2, {"silent"}, kNow + kLease)));
+  // Nobody has taken it over: a late result is welcome, once.
+  EXPECT_TRUE(Complete(1, 2, Digest('a')).ok());
+  EXPECT_TRUE(absl::IsAborted(Complete(1, 2, Digest('b'))));
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->filtered_digest, Digest('a'));
 }
 
-TEST_P(JobStoreConformance, LeasesAreListedByWorker) {
+TEST_P(JobStoreConformance, AWorkerThatComesBackWithAStaleResultIsRefused) {
+  AssignJobs("castle", 1);
+  ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
+  ASSERT_TRUE(End(JobChange::Kind::kLose, 1, 2, "ant", "silent").ok());
+  ASSERT_TRUE(Claim(1, 2, "bee").status.ok());
+  EXPECT_TRUE(absl::IsAborted(Complete(1, 2, Digest('a'))));
+  for (const JobChange::Kind kind : {JobChange::Kind::kRenew, JobChange::Kind::kRelease, JobChange::Kind::kFail,
+                                     JobChange::Kind::kLose, JobChange::Kind::kSetAside}) {
+    EXPECT_TRUE(absl::IsAborted(End(kind, 1, 2, "ant", "crash"))) << static_cast<int>(kind);
+  }
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->lease_worker, "bee");
+  EXPECT_TRUE(Complete(1, 3, Digest('b')).ok());
+}
+
+TEST_P(JobStoreConformance, AChangeThatCannotBeStoredLeavesTheOthersAlone) {
   AssignJobs("castle", 3);
-  LeaseRequest request = RequestOf("ant");
-  request.max_jobs = 2;
-  ASSERT_TRUE(store().LeaseCameraJobs(request).ok());
-  ASSERT_TRUE(store().LeaseCameraJobs(RequestOf("bee")).ok());
-  EXPECT_THAT(Names(store().ListLeases("ant")), testing::ElementsAre("castle/1", "castle/2"));
-  EXPECT_THAT(Names(store().ListLeases("bee")), testing::ElementsAre("castle/3"));
-  EXPECT_EQ(Names(store().ListLeases("")).size(), 3);
+  std::vector<JobChange> changes;
+  for (int s = 1; s <= 3; ++s) {
+    changes.push_back(ChangeOf(JobChange::Kind::kComplete, s, 1, ""));
+    changes.back().filtered_digest = s == 2 ? "short" : Digest('a');
+    changes.back().report_json = "{}";
+  }
+  const auto results = store().ApplyChanges(changes, {{.id = "ant", .cores = 2, .last_heartbeat = kNow}}, kNow);
+  ASSERT_TRUE(results.ok()) << results.status();
+  EXPECT_TRUE(results->at(0).status.ok());
+  EXPECT_FALSE(results->at(1).status.ok());
+  EXPECT_TRUE(results->at(2).status.ok());
+  EXPECT_EQ(store().ListResults("castle")->size(), 2);
+  EXPECT_EQ(store().ListWorkers()->size(), 1);
+}
+
+TEST_P(JobStoreConformance, AttemptsAreRemembered) {
+  AssignJobs("castle", 2);
+  EXPECT_TRUE(store().ListAttempts("castle", 10)->empty());
+  ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
+  ASSERT_TRUE(End(JobChange::Kind::kFail, 1, 2, "ant", "crash").ok());
+  ASSERT_TRUE(Claim(1, 2, "bee", kNow + kLease).status.ok());
+  JobChange done = ChangeOf(JobChange::Kind::kComplete, 1, 3, "");
+  done.filtered_digest = Digest('a');
+  done.report_json = "{}";
+  ASSERT_TRUE(Apply(done, kNow + 2 * kLease).status.ok());
+  ASSERT_TRUE(Claim(2, 1, "ant", kNow - kLease).status.ok());
+  ASSERT_TRUE(End(JobChange::Kind::kSetAside, 2, 2, "", "poison").ok());
+  const auto attempts = store().ListAttempts("castle", 10);
+  ASSERT_TRUE(attempts.ok()) << attempts.status();
+  ASSERT_EQ(attempts->size(), 3);
+  EXPECT_EQ(attempts->at(0).worker, "bee");
+  EXPECT_EQ(attempts->at(0).ending, "finished");
+  EXPECT_EQ(attempts->at(0).began_at, kNow + kLease);
+  EXPECT_EQ(attempts->at(0).ended_at, kNow + 2 * kLease);
+  EXPECT_EQ(attempts->at(1).ending, "failed");
+  EXPECT_EQ(attempts->at(1).reason, "crash");
+  EXPECT_EQ(attempts->at(2).camera, 2);
+  EXPECT_EQ(attempts->at(2).reason, "poison");
+  EXPECT_EQ(store().ListAttempts("castle", 1)->size(), 1);
+  // Only so many of one job.
+  AssignJobs("castle", 3);
+  for (int64_t epoch = 1; epoch <= 40; ++epoch) {
+    ASSERT_TRUE(Claim(3, epoch, "ant").status.ok());
+    ASSERT_TRUE(End(JobChange::Kind::kRelease, 3, epoch + 1, "ant").ok());
+  }
+  EXPECT_EQ(store().ListAttempts("castle", 100)->size(), 3 + 16);
+}
+
+TEST_P(JobStoreConformance, AResultThatIsLostIsMadeAgainAndMustBeTheSame) {
+  AssignJobs("castle", 1);
+  ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
+  ASSERT_TRUE(End(JobChange::Kind::kFail, 1, 2, "ant", "crash").ok());
+  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 2, Digest('a'), {3}, "{}", kNow).ok());
+  ASSERT_TRUE(store().AddCommit("castle", {1, 1, Digest('b'), 9, 4}, kNow).ok());
+  EXPECT_TRUE(absl::IsAborted(store().ReopenCameraJob("castle", 1, 1, Digest('a'), "damaged", kNow)));
+  ASSERT_TRUE(store().ReopenCameraJob("castle", 1, 2, Digest('a'), "damaged", kNow).ok());
+  EXPECT_TRUE(absl::IsAborted(store().ReopenCameraJob("castle", 1, 2, Digest('a'), "damaged", kNow)));
+  const auto open = store().ListOpenJobs();
+  ASSERT_EQ(open->size(), 1);
+  EXPECT_TRUE(open->at(0).is_repair);
+  EXPECT_EQ(open->at(0).failed_attempts, 0);
+  EXPECT_EQ(open->at(0).epoch, 3);
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->expected_digest, Digest('a'));
+  ASSERT_TRUE(Claim(1, 3, "bee").status.ok());
+  EXPECT_FALSE(End(JobChange::Kind::kSetAside, 1, 4, "bee", "poison").ok());
+  EXPECT_FALSE(Complete(1, 4, Digest('c')).ok());
+  EXPECT_TRUE(Complete(1, 4, Digest('a')).ok());
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->state, CameraJobState::kDone);
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->expected_digest, "");
+}
+
+TEST_P(JobStoreConformance, AResultThatIsNoneIsTakenBack) {
+  AssignJobs("castle", 1);
+  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
+  ASSERT_TRUE(store().ReopenCameraJob("castle", 1, 1, "", "no surface", kNow + kLease).ok());
+  const auto open = store().ListOpenJobs();
+  ASSERT_EQ(open->size(), 1);
+  EXPECT_FALSE(open->at(0).is_repair);
+  EXPECT_EQ(open->at(0).failed_attempts, 1);
+  EXPECT_EQ(open->at(0).not_before, kNow + kLease);
+  EXPECT_TRUE(store().ListResults("castle")->empty());
+  ASSERT_TRUE(store().SetCameraJobAside("castle", 1, 2, "no surface", kNow).ok());
+  ASSERT_EQ(store().ListResults("castle")->size(), 1);
+  EXPECT_TRUE(store().ListResults("castle")->at(0).set_aside);
+  EXPECT_TRUE(store().ListResults("castle", 1)->empty());
 }
 
 // Two stores as two coordinators have them, several threads each: every job is leased exactly once.
@@ -393,39 +474,39 @@ TEST_P(JobStoreConformance, NoJobIsLeasedTwice) {
   constexpr int kThreads = 4;
   AssignJobs("castle", kJobs);
   const std::unique_ptr<JobStore> other = fixture_.reopen();
-  std::vector<std::vector<std::string>> got(kThreads);
+  std::vector<int> won(kThreads, 0);
   std::vector<std::thread> threads;
   threads.reserve(kThreads);
   for (int t = 0; t < kThreads; ++t) {
     threads.emplace_back([&, t] {
       JobStore& mine = t % 2 == 0 ? store() : *other;
-      while (true) {
-        const auto leases = Names(mine.LeaseCameraJobs(RequestOf("worker" + std::to_string(t))));
-        if (leases.empty()) break;
-        got[static_cast<size_t>(t)].push_back(leases.front());
+      for (int begin = 1; begin <= kJobs; begin += 6) {
+        std::vector<JobChange> claims;
+        for (int s = begin; s < begin + 6; ++s) {
+          claims.push_back(ChangeOf(JobChange::Kind::kClaim, s, 1, "worker" + std::to_string(t)));
+        }
+        const auto results = mine.ApplyChanges(claims, {}, kNow);
+        if (!results.ok()) continue;
+        for (const JobChangeResult& result : *results) won[static_cast<size_t>(t)] += result.status.ok() ? 1 : 0;
       }
     });
   }
   for (std::thread& thread : threads) thread.join();
-  std::set<std::string> all;
-  size_t count = 0;
-  for (const auto& names : got) {
-    all.insert(names.begin(), names.end());
-    count += names.size();
-  }
-  EXPECT_EQ(all.size(), kJobs);
-  EXPECT_EQ(count, kJobs);
+  EXPECT_EQ(won[0] + won[1] + won[2] + won[3], kJobs);
+  const auto jobs = store().ListCameraJobs("castle");
+  for (const CameraJob& job : *jobs) EXPECT_EQ(job.epoch, 2);
 }
 
 // Conductors.
 
 TEST_P(JobStoreConformance, AReconstructionHasOneConductorAtATime) {
-  EXPECT_THAT(*store().ListUnconductedReconstructions(kNow), testing::ElementsAre("castle"));
+  ASSERT_EQ(store().ListConducted()->size(), 1);
+  EXPECT_EQ(store().ListConducted()->at(0).lease.epoch, 0);
   EXPECT_TRUE(absl::IsNotFound(store().GetConductorLease("castle").status()));
   const auto first = store().AcquireConductorLease("castle", "north", kNow + kLease, kNow);
   ASSERT_TRUE(first.ok()) << first.status();
   EXPECT_EQ(*first, 1);
-  EXPECT_TRUE(store().ListUnconductedReconstructions(kNow)->empty());
+  EXPECT_EQ(store().ListConducted()->at(0).lease.owner, "north");
   const absl::Status refused = store().AcquireConductorLease("castle", "south", kNow + kLease, kNow).status();
   EXPECT_TRUE(absl::IsFailedPrecondition(refused)) << refused;
   EXPECT_TRUE(store().RenewConductorLease("castle", 1, kNow + 2 * kLease, kNow).ok());
@@ -433,12 +514,11 @@ TEST_P(JobStoreConformance, AReconstructionHasOneConductorAtATime) {
   Reopen();
   EXPECT_EQ(store().GetConductorLease("castle")->owner, "north");
   EXPECT_EQ(store().GetConductorLease("castle")->expires_at, kNow + 2 * kLease);
-  EXPECT_THAT(*store().ListUnconductedReconstructions(kNow + 2 * kLease), testing::ElementsAre("castle"));
   EXPECT_EQ(*store().AcquireConductorLease("castle", "south", kNow + 9 * kLease, kNow + 2 * kLease), 2);
   EXPECT_TRUE(absl::IsAborted(store().RenewConductorLease("castle", 1, kNow + 9 * kLease, kNow)));
   // Given back: the next one need not wait. A release of an old epoch changes nothing.
   EXPECT_TRUE(store().ReleaseConductorLease("castle", 1, kNow).ok());
-  EXPECT_TRUE(store().ListUnconductedReconstructions(kNow + 3 * kLease)->empty());
+  EXPECT_EQ(store().ListConducted()->at(0).lease.expires_at, kNow + 9 * kLease);
   EXPECT_TRUE(store().ReleaseConductorLease("castle", 2, kNow + 3 * kLease).ok());
   EXPECT_EQ(*store().AcquireConductorLease("castle", "north", kNow + 9 * kLease, kNow + 3 * kLease), 3);
   // A coordinator that was restarted under its name takes back what it held.
@@ -449,21 +529,21 @@ TEST_P(JobStoreConformance, AReconstructionHasOneConductorAtATime) {
 
 TEST_P(JobStoreConformance, OnlyTheConductorWrites) {
   ASSERT_EQ(*store().AcquireConductorLease("castle", "north", kNow + kLease, kNow), 1);
-  ASSERT_TRUE(store().AssignCameraJob("castle", 1, 7, 0, kNow, 1).ok());
+  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow, 1).ok());
   ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
   ASSERT_EQ(*store().AcquireConductorLease("castle", "south", kNow + 3 * kLease, kNow + 2 * kLease), 2);
   const Commit commit = {1, 7, Digest('b'), 9, 4};
   EXPECT_TRUE(absl::IsAborted(store().AddCommit("castle", commit, kNow, 1)));
-  EXPECT_TRUE(absl::IsAborted(store().AssignCameraJob("castle", 2, 8, 0, kNow, 1)));
-  EXPECT_TRUE(absl::IsAborted(store().AssignCameraJob("castle", 1, 7, 0, kNow, 1)));
-  EXPECT_TRUE(absl::IsAborted(store().SetReconstructionState("castle", ReconstructionState::kDone, "", 1)));
+  EXPECT_TRUE(absl::IsAborted(store().AssignCameraJob("castle", {2, 8, 0}, kNow, 1)));
+  EXPECT_TRUE(absl::IsAborted(store().AssignCameraJob("castle", {1, 7, 0}, kNow, 1)));
+  EXPECT_TRUE(absl::IsAborted(store().SetReconstructionState("castle", ReconstructionState::kDone, kNow, "", 1)));
   EXPECT_TRUE(store().ListCommits("castle")->empty());
   EXPECT_EQ(store().ListCameraJobs("castle")->size(), 1);
   EXPECT_TRUE(store().AddCommit("castle", commit, kNow, 2).ok());
   EXPECT_TRUE(store().AddCommit("castle", commit, kNow, 2).ok());
-  EXPECT_TRUE(store().AssignCameraJob("castle", 2, 8, 0, kNow, 2).ok());
-  EXPECT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kDone, "", 2).ok());
-  EXPECT_TRUE(store().ListUnconductedReconstructions(kNow + 9 * kLease)->empty());
+  EXPECT_TRUE(store().AssignCameraJob("castle", {2, 8, 0}, kNow, 2).ok());
+  EXPECT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kDone, kNow, "", 2).ok());
+  EXPECT_TRUE(store().ListConducted()->empty());
   EXPECT_THAT(*store().ListCommits("castle"), testing::ElementsAre(commit));
 }
 
@@ -486,25 +566,29 @@ TEST_P(JobStoreConformance, NobodyConductsInVainWhenManyTry) {
 
 TEST_P(JobStoreConformance, CommitsAndChoicesAdvanceTogether) {
   ASSERT_EQ(*store().AcquireConductorLease("castle", "north", kNow + kLease, kNow), 1);
-  ASSERT_TRUE(store().Advance("castle", {}, {{1, 7, 0, 5}, {2, 3, 0, 6}}, kNow, 1).ok());
-  ASSERT_TRUE(store().Advance("castle", {}, {}, kNow, 1).ok());
+  StoredProgress progress = {.cameras_total = 9, .cameras_in_flight = 2};
+  ASSERT_TRUE(store().Advance("castle", {}, {{1, 7, 0, 5}, {2, 3, 0, 6}}, progress, kNow, 1).ok());
+  ASSERT_TRUE(store().Advance("castle", {}, {}, progress, kNow, 1).ok());
   for (int s = 1; s <= 2; ++s) {
     ASSERT_TRUE(store().CompleteCameraJob("castle", s, 1, Digest('a'), {}, "{}", kNow).ok());
   }
   const std::vector<Commit> commits = {{1, 7, Digest('b'), 9, 4}, {2, 3, "", 0, 0}};
   const std::vector<CameraAssignment> choices = {{3, 5, 2, 0}};
-  EXPECT_TRUE(absl::IsAborted(store().Advance("castle", commits, choices, kNow, 2)));
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().Advance("castle", {commits[1]}, choices, kNow, 1)));
+  EXPECT_EQ(store().GetReconstruction("castle")->progress, progress);
+  progress.cameras_committed = 2;
+  EXPECT_TRUE(absl::IsAborted(store().Advance("castle", commits, choices, progress, kNow, 2)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(store().Advance("castle", {commits[1]}, choices, progress, kNow, 1)));
   EXPECT_TRUE(store().ListCommits("castle")->empty());
   EXPECT_EQ(store().ListCameraJobs("castle")->size(), 2);
-  EXPECT_TRUE(store().Advance("castle", commits, choices, kNow, 1).ok());
-  EXPECT_TRUE(store().Advance("castle", commits, choices, kNow, 1).ok());
+  EXPECT_TRUE(store().Advance("castle", commits, choices, progress, kNow, 1).ok());
+  EXPECT_TRUE(store().Advance("castle", commits, choices, progress, kNow, 1).ok());
   // A part of it is there already.
-  EXPECT_TRUE(store().Advance("castle", {commits[1]}, {{3, 5, 2, 0}, {4, 6, 2, 0}}, kNow, 1).ok());
+  EXPECT_TRUE(store().Advance("castle", {commits[1]}, {{3, 5, 2, 0}, {4, 6, 2, 0}}, progress, kNow, 1).ok());
   Reopen();
   EXPECT_THAT(*store().ListCommits("castle"), testing::ElementsAreArray(commits));
   EXPECT_EQ(store().ListCameraJobs("castle")->size(), 4);
   EXPECT_EQ(store().GetCameraJob("castle", 1)->memory_bytes, 5);
+  EXPECT_EQ(store().GetReconstruction("castle")->progress, progress);
 }
 
 // The life of a reconstruction.
@@ -519,10 +603,10 @@ TEST_P(JobStoreConformance, AReconstructionRunsOnceItsSceneIsThere) {
                                         kNow)
                   .ok());
   EXPECT_EQ(store().GetReconstruction("abbey")->weight, 3);
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().SetReconstructionState("abbey", ReconstructionState::kRunning)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(store().SetReconstructionState("abbey", ReconstructionState::kRunning, kNow)));
   EXPECT_TRUE(store().SetReconstructionScene("abbey", Digest('1')).ok());
   EXPECT_TRUE(store().SetReconstructionScene("abbey", Digest('2')).ok());
-  EXPECT_TRUE(store().SetReconstructionState("abbey", ReconstructionState::kRunning).ok());
+  EXPECT_TRUE(store().SetReconstructionState("abbey", ReconstructionState::kRunning, kNow).ok());
   EXPECT_TRUE(store().SetReconstructionScene("abbey", Digest('2')).ok());
   EXPECT_TRUE(absl::IsFailedPrecondition(store().SetReconstructionScene("abbey", Digest('3'))));
   EXPECT_TRUE(absl::IsNotFound(store().SetReconstructionScene("ruin", Digest('3'))));
@@ -530,24 +614,26 @@ TEST_P(JobStoreConformance, AReconstructionRunsOnceItsSceneIsThere) {
 }
 
 TEST_P(JobStoreConformance, FinalStatesStay) {
-  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kFailed, "no pair is feasible").ok());
-  EXPECT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kFailed, "again").ok());
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().SetReconstructionState("castle", ReconstructionState::kRunning)));
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().SetReconstructionState("castle", ReconstructionState::kDone)));
+  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kFailed, kNow, "no pair is feasible").ok());
+  EXPECT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kFailed, kNow, "again").ok());
+  EXPECT_TRUE(
+      absl::IsFailedPrecondition(store().SetReconstructionState("castle", ReconstructionState::kRunning, kNow)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(store().SetReconstructionState("castle", ReconstructionState::kDone, kNow)));
   EXPECT_EQ(store().GetReconstruction("castle")->state, ReconstructionState::kFailed);
   EXPECT_EQ(store().GetReconstruction("castle")->state_reason, "no pair is feasible");
 }
 
 TEST_P(JobStoreConformance, DeletingTakesEverythingAlong) {
   AssignJobs("castle", 2);
-  ASSERT_TRUE(store().LeaseCameraJobs(RequestOf("ant")).ok());
+  ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
   ASSERT_TRUE(store().SetCameraJobAside("castle", 1, 2, "gone", kNow).ok());
   ASSERT_TRUE(store().AddCommit("castle", {1, 1, "", 0, 0}, kNow).ok());
   ASSERT_TRUE(store().AcquireConductorLease("castle", "north", kNow + kLease, kNow).ok());
   EXPECT_TRUE(store().DeleteReconstruction("castle").ok());
   EXPECT_TRUE(store().DeleteReconstruction("castle").ok());
   EXPECT_TRUE(store().ListReconstructions()->empty());
-  ASSERT_TRUE(store().CreateReconstruction(kReconstruction, kNow).ok());
+  EXPECT_TRUE(absl::IsAlreadyExists(store().CreateReconstruction(kReconstruction, kNow)));  // its id stays taken
+  EXPECT_TRUE(store().ListAttempts("castle", 10)->empty());
   EXPECT_TRUE(store().ListCameraJobs("castle")->empty());
   EXPECT_TRUE(store().ListCommits("castle")->empty());
   EXPECT_TRUE(absl::IsNotFound(store().GetConductorLease("castle").status()));
@@ -588,12 +674,18 @@ TEST_P(JobStoreConformance, TextIsKeptAsItIs) {
 
 TEST_P(JobStoreConformance, WorkersAreKnownByTheirHeartbeats) {
   EXPECT_TRUE(absl::IsNotFound(store().SetWorkerDrained("ant", true)));
-  ASSERT_TRUE(store().RecordHeartbeat("bee", 4, 8'000'000'000, kNow).ok());
-  ASSERT_TRUE(store().RecordHeartbeat("ant", 2, 1'000, kNow).ok());
+  const WorkerRecord bee = {.id = "bee", .cores = 4, .memory_bytes = 8'000'000'000, .last_heartbeat = kNow};
+  WorkerRecord ant = {.id = "ant", .cores = 2, .memory_bytes = 1'000, .last_heartbeat = kNow};
+  ASSERT_TRUE(store().ApplyChanges({}, {bee, ant}, kNow).ok());
   ASSERT_TRUE(store().SetWorkerDrained("ant", true).ok());
-  ASSERT_TRUE(store().RecordHeartbeat("ant", 3, 2'000, kNow + kLease).ok());
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().RecordHeartbeat("", 3, 2'000, kNow)));
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().RecordHeartbeat("cat", -1, 2'000, kNow)));
+  ant = {.id = "ant",
+         .cores = 3,
+         .memory_bytes = 2'000,
+         .last_heartbeat = kNow + kLease,
+         .instance = "x",
+         .version = "7",
+         .draining = true};
+  ASSERT_TRUE(store().ApplyChanges({}, {ant}, kNow).ok());
   Reopen();
   const auto workers = store().ListWorkers();
   ASSERT_TRUE(workers.ok());
@@ -602,13 +694,88 @@ TEST_P(JobStoreConformance, WorkersAreKnownByTheirHeartbeats) {
   EXPECT_EQ(workers->at(0).cores, 3);
   EXPECT_EQ(workers->at(0).memory_bytes, 2'000);
   EXPECT_EQ(workers->at(0).last_heartbeat, kNow + kLease);
+  EXPECT_EQ(workers->at(0).instance, "x");
+  EXPECT_EQ(workers->at(0).version, "7");
   EXPECT_TRUE(workers->at(0).drained);
-  EXPECT_EQ(workers->at(1).id, "bee");
+  EXPECT_TRUE(workers->at(0).draining);
   EXPECT_EQ(workers->at(1).memory_bytes, 8'000'000'000);
   EXPECT_FALSE(workers->at(1).drained);
-  EXPECT_TRUE(store().RemoveWorker("ant").ok());
-  EXPECT_TRUE(store().RemoveWorker("ant").ok());
-  EXPECT_EQ(store().ListWorkers()->size(), 1);
+}
+
+TEST_P(JobStoreConformance, SilentWorkersAreForgottenUnlessTheyHoldSomething) {
+  AssignJobs("castle", 1);
+  ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
+  for (const char* id : {"ant", "bee", "cat"}) {
+    const absl::Time heard = id == std::string("cat") ? kNow + kLease : kNow;
+    ASSERT_TRUE(store().ApplyChanges({}, {{.id = id, .cores = 1, .last_heartbeat = heard}}, kNow).ok());
+  }
+  ASSERT_TRUE(store().RemoveSilentWorkers(kNow + kLease).ok());
+  ASSERT_EQ(store().ListWorkers()->size(), 2);
+  EXPECT_EQ(store().ListWorkers()->at(1).id, "cat");
+}
+
+// Files and blobs.
+
+TEST_P(JobStoreConformance, SceneFilesAreReplacedByPath) {
+  ASSERT_TRUE(store().PutSceneFile("castle", {"b/c.jpg", 5, Digest('1')}).ok());
+  ASSERT_TRUE(store().PutSceneFile("castle", {"a.txt", 6, Digest('2')}).ok());
+  ASSERT_TRUE(store().PutSceneFile("castle", {"a.txt", 7, Digest('3')}).ok());
+  EXPECT_FALSE(store().PutSceneFile("ruin", {"a.txt", 7, Digest('3')}).ok());
+  EXPECT_THAT(*store().ListSceneFiles("castle"),
+              testing::ElementsAre(SceneFile{"a.txt", 7, Digest('3')}, SceneFile{"b/c.jpg", 5, Digest('1')}));
+}
+
+TEST_P(JobStoreConformance, OnlyBlobsThatNobodyElseHasVanish) {
+  ASSERT_TRUE(store().CreateReconstruction({"abbey", "{}", Digest('1')}, kNow).ok());
+  AssignJobs("castle", 2);
+  AssignJobs("abbey", 2);
+  EXPECT_TRUE(*store().HoldBlob("castle", Digest('p')));
+  EXPECT_TRUE(*store().HoldBlob("castle", Digest('p')));
+  EXPECT_TRUE(*store().HoldBlob("castle", Digest('q')));
+  EXPECT_TRUE(*store().HoldBlob("abbey", Digest('q')));
+  EXPECT_TRUE(absl::IsNotFound(store().HoldBlob("ruin", Digest('q')).status()));
+  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
+  ASSERT_TRUE(store().CompleteCameraJob("castle", 2, 1, Digest('b'), {}, "{}", kNow).ok());
+  ASSERT_TRUE(store().CompleteCameraJob("abbey", 1, 1, Digest('b'), {}, "{}", kNow).ok());
+  ASSERT_TRUE(store().AddCommit("castle", {1, 1, Digest('c'), 9, 4}, kNow).ok());
+  ASSERT_TRUE(store().AddCommit("castle", {2, 2, Digest('d'), 9, 4}, kNow).ok());
+  ASSERT_TRUE(store().AddCommit("abbey", {1, 1, Digest('d'), 9, 4}, kNow).ok());
+  ASSERT_TRUE(store().BeginDeletion("castle").ok());
+  EXPECT_TRUE(store().BeginDeletion("castle").ok());
+  EXPECT_EQ(store().ListReconstructions()->size(), 1);
+  EXPECT_THAT(*store().LetBlobsVanish("castle"), testing::ElementsAre(Digest('a'), Digest('c'), Digest('p')));
+  // Nobody may put one of them now; once they are gone they may come back.
+  EXPECT_FALSE(*store().HoldBlob("abbey", Digest('p')));
+  EXPECT_THAT(*store().LetBlobsVanish("castle"), testing::ElementsAre(Digest('a'), Digest('c')));
+  ASSERT_TRUE(store().DeleteReconstruction("castle").ok());
+  EXPECT_TRUE(*store().HoldBlob("abbey", Digest('p')));
+  // The other one takes the rest along.
+  ASSERT_TRUE(store().BeginDeletion("abbey").ok());
+  EXPECT_THAT(*store().LetBlobsVanish("abbey"),
+              testing::ElementsAre(Digest('b'), Digest('d'), Digest('p'), Digest('q')));
+}
+
+TEST_P(JobStoreConformance, DamagedBlobsAreReportedOnce) {
+  EXPECT_TRUE(store().ReportDamagedBlob("castle", Digest('a')).ok());
+  EXPECT_TRUE(store().ReportDamagedBlob("castle", Digest('a')).ok());
+  EXPECT_THAT(*store().ListDamagedBlobs("castle"), testing::ElementsAre(Digest('a')));
+  EXPECT_TRUE(store().ForgetDamagedBlob("castle", Digest('a')).ok());
+  EXPECT_TRUE(store().ListDamagedBlobs("castle")->empty());
+}
+
+TEST_P(JobStoreConformance, AMeshEndsAReconstruction) {
+  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kJoining, kNow).ok());
+  EXPECT_EQ(store().GetReconstruction("castle")->finished_at, absl::InfinitePast());
+  ASSERT_TRUE(store().FinishReconstruction("castle", {Digest('m'), 5, 6, 7}, kNow + kLease).ok());
+  EXPECT_TRUE(store().FinishReconstruction("castle", {Digest('m'), 5, 6, 7}, kNow + kLease).ok());
+  const Reconstruction done = *store().GetReconstruction("castle");
+  EXPECT_EQ(done.state, ReconstructionState::kDone);
+  EXPECT_EQ(done.finished_at, kNow + kLease);
+  EXPECT_EQ(done.created_at, kNow);
+  EXPECT_EQ(done.mesh.digest, Digest('m'));
+  EXPECT_EQ(done.mesh.faces, 7);
+  EXPECT_TRUE(
+      absl::IsFailedPrecondition(store().SetReconstructionState("castle", ReconstructionState::kCancelled, kNow)));
 }
 
 }  // namespace meshwright

@@ -28,12 +28,27 @@ constexpr int kTransientAttempts = 10;
 constexpr absl::Duration kFirstPause = absl::Milliseconds(20);
 constexpr absl::Duration kLongestPause = absl::Seconds(1);
 
+// "/*postgres: X */" -> "X"
+std::string WithPostgresParts(const std::string& sql) {
+  constexpr char kBegin[] = "/*postgres: ";
+  std::string result = sql;
+  for (size_t at = result.find(kBegin); at != std::string::npos; at = result.find(kBegin, at)) {
+    const size_t end = result.find("*/", at);
+    MW_CHECK(end != std::string::npos);
+    result.erase(end, 2);
+    result.erase(at, sizeof(kBegin) - 1);
+  }
+  return result;
+}
+
 class PostgresDatabase : public SqlDatabase {
  public:
   PostgresDatabase(std::string url, std::string description, const PostgresOptions& options)
       : url_(std::move(url)), description_(std::move(description)), options_(options) {
     for (const auto& files : {CommonStatements(), PostgresStatements()}) {
-      for (const auto& [name, sql] : ParseSqlStatements(files)) statements_[name] = NumberParameters(sql);
+      for (const auto& [name, sql] : ParseSqlStatements(files)) {
+        statements_[name] = NumberParameters(WithPostgresParts(sql));
+      }
     }
   }
 
@@ -52,21 +67,14 @@ class PostgresDatabase : public SqlDatabase {
   }
 
   absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>& calls) override {
-    bool all_changed = true;
-    MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Time deadline) {
-      all_changed = true;
-      PostgresError error = connection.RunCommand("BEGIN", deadline);
-      for (const SqlCall& call : calls) {
-        if (!error.status.ok() || !all_changed) break;
-        SqlResult result;
-        error = connection.Run(call.statement, statements_.at(call.statement), call.parameters, deadline, &result);
-        all_changed = result.changed == 1;
-      }
-      if (error.status.ok() && all_changed) return connection.RunCommand("COMMIT", deadline);
-      const PostgresError rollback = connection.RunCommand("ROLLBACK", deadline);
-      return error.status.ok() ? rollback : error;
-    }));
-    return all_changed;
+    const absl::Status status = RunTransaction(calls, /*each_changes_one_row=*/true).status();
+    if (absl::IsCancelled(status)) return false;
+    MW_RETURN_IF_ERROR(status);
+    return true;
+  }
+
+  absl::StatusOr<std::vector<SqlResult>> RunAll(const std::vector<SqlCall>& calls) override {
+    return RunTransaction(calls, /*each_changes_one_row=*/false);
   }
 
   absl::StatusOr<absl::Time> Now() override {
@@ -75,6 +83,28 @@ class PostgresDatabase : public SqlDatabase {
   }
 
  private:
+  // Cancelled: one did not change exactly one row, and nothing was changed.
+  absl::StatusOr<std::vector<SqlResult>> RunTransaction(const std::vector<SqlCall>& calls, bool each_changes_one_row) {
+    std::vector<SqlResult> results;
+    bool all_changed = true;
+    MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Time deadline) {
+      results.clear();
+      all_changed = true;
+      PostgresError error = connection.RunCommand("BEGIN", deadline);
+      for (const SqlCall& call : calls) {
+        if (!error.status.ok() || !all_changed) break;
+        SqlResult& result = results.emplace_back();
+        error = connection.Run(call.statement, statements_.at(call.statement), call.parameters, deadline, &result);
+        all_changed = !each_changes_one_row || result.changed == 1;
+      }
+      if (error.status.ok() && all_changed) return connection.RunCommand("COMMIT", deadline);
+      const PostgresError rollback = connection.RunCommand("ROLLBACK", deadline);
+      return error.status.ok() ? rollback : error;
+    }));
+    if (!all_changed) return absl::CancelledError("rolled back");
+    return results;
+  }
+
   using Action = std::function<PostgresError(PostgresConnection&, absl::Time deadline)>;
 
   // Runs the action until it succeeds, is refused, or patience ends.

@@ -73,7 +73,7 @@ TEST_F(PostgresJobStoreTest, ManyCoordinatorsMayStartAtOnce) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(opened.load(), kCoordinators);
-  EXPECT_EQ(RunSql(schema_->url(), "SELECT count(*) FROM meshwright_migrations"), "1");
+  EXPECT_EQ(RunSql(schema_->url(), "SELECT count(*) FROM meshwright_migrations"), "2");
 }
 
 TEST_F(PostgresJobStoreTest, ADatabaseOfANewerProgramIsRefused) {
@@ -115,7 +115,7 @@ TEST_F(PostgresJobStoreTest, SessionsThatTheServerEndsAreMadeAnew) {
   for (int s = 1; s <= 20; ++s) {
     RunSql(server_url_,
            "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name = 'meshwright'");
-    const absl::Status status = store->AssignCameraJob("castle", s, s, 0, kNow);
+    const absl::Status status = store->AssignCameraJob("castle", {s, s, 0}, kNow);
     EXPECT_TRUE(status.ok()) << status;
   }
   EXPECT_EQ(store->ListCameraJobs("castle")->size(), 20);
@@ -169,7 +169,7 @@ TEST(PostgresRestartTest, CallsOutliveARestart) {
     threads.emplace_back([&] {
       while (!stop) {
         const int s = next++;
-        const absl::Status assigned = store->AssignCameraJob("castle", s, s, 0, now);
+        const absl::Status assigned = store->AssignCameraJob("castle", {s, s, 0}, now);
         EXPECT_TRUE(assigned.ok()) << assigned;
         const absl::Status completed = store->CompleteCameraJob("castle", s, 1, std::string(64, 'a'), {}, "{}", now);
         EXPECT_TRUE(completed.ok()) << completed;

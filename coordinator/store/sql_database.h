@@ -24,8 +24,10 @@ inline SqlValue NullIfEmpty(const std::string& text) { return text.empty() ? Sql
 class SqlRow {
  public:
   explicit SqlRow(std::vector<std::string> values) : values_(std::move(values)) {}
+  size_t Columns() const { return values_.size(); }
   const std::string& Text(size_t column) const { return values_[column]; }  // NULL reads as ""
   int64_t Integer(size_t column) const;                                     // NULL reads as 0
+  bool IsNull(size_t column) const { return values_[column].empty(); }      // or ""
   absl::Time Time(size_t column) const { return absl::FromUnixMicros(Integer(column)); }
 
  private:
@@ -51,6 +53,8 @@ class SqlDatabase {
   // Runs several, each of which must change exactly one row, as one durable transaction. False: one of them did not,
   // and nothing was changed.
   virtual absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>& calls) = 0;
+  // Runs several as one durable transaction, whatever each of them changes.
+  virtual absl::StatusOr<std::vector<SqlResult>> RunAll(const std::vector<SqlCall>& calls) = 0;
   virtual absl::StatusOr<absl::Time> Now() = 0;
 };
 

@@ -1,5 +1,7 @@
 #include "coordinator/store/sql_job_store.h"
 
+#include <cmath>
+
 #include <absl/strings/str_cat.h>
 
 #include "common/base/status_macros.h"
@@ -7,11 +9,12 @@
 namespace meshwright {
 namespace {
 
-constexpr std::pair<ReconstructionState, const char*> kStateTexts[] = {{ReconstructionState::kCreated, "created"},
-                                                                       {ReconstructionState::kRunning, "running"},
-                                                                       {ReconstructionState::kDone, "done"},
-                                                                       {ReconstructionState::kCancelled, "cancelled"},
-                                                                       {ReconstructionState::kFailed, "failed"}};
+constexpr std::pair<ReconstructionState, const char*> kStateTexts[] = {
+    {ReconstructionState::kCreated, "created"}, {ReconstructionState::kPreparing, "preparing"},
+    {ReconstructionState::kRunning, "running"}, {ReconstructionState::kJoining, "joining"},
+    {ReconstructionState::kDone, "done"},       {ReconstructionState::kCancelled, "cancelled"},
+    {ReconstructionState::kFailed, "failed"},   {ReconstructionState::kDeleting, "deleting"}};
+constexpr double kWeightUnits = 1000;
 
 std::string StateText(ReconstructionState wanted) {
   for (const auto& [state, text] : kStateTexts) {
@@ -21,16 +24,23 @@ std::string StateText(ReconstructionState wanted) {
 }
 
 absl::StatusOr<Reconstruction> ReadReconstruction(const SqlRow& row) {
-  for (const auto& [state, text] : kStateTexts) {
-    if (row.Text(3) != text) continue;
-    return Reconstruction{.id = row.Text(0),
-                          .options_json = row.Text(1),
-                          .scene_digest = row.Text(2),
-                          .state = state,
-                          .state_reason = row.Text(4),
-                          .weight = row.Integer(5)};
-  }
-  return absl::DataLossError(absl::StrCat("reconstruction ", row.Text(0), " has the unknown state ", row.Text(3)));
+  Reconstruction reconstruction = {.id = row.Text(0), .options_json = row.Text(1), .scene_digest = row.Text(2)};
+  MW_ASSIGN_OR_RETURN(reconstruction.state, ReadReconstructionState(row.Text(3)));
+  reconstruction.state_reason = row.Text(4);
+  reconstruction.weight = static_cast<double>(row.Integer(5)) / kWeightUnits;
+  reconstruction.scene_reference = row.Text(6);
+  reconstruction.scene_blob = row.Text(7);
+  reconstruction.created_at = row.Time(8);
+  if (!row.IsNull(9)) reconstruction.finished_at = row.Time(9);
+  reconstruction.mesh = {
+      .digest = row.Text(10), .bytes = row.Integer(11), .vertices = row.Integer(12), .faces = row.Integer(13)};
+  reconstruction.progress = {.cameras_total = row.Integer(14),
+                             .cameras_committed = row.Integer(15),
+                             .cameras_set_aside = row.Integer(16),
+                             .cameras_in_flight = row.Integer(17),
+                             .patches_filtered = row.Integer(18),
+                             .patches_accepted = row.Integer(19)};
+  return reconstruction;
 }
 
 Commit ReadCommit(const SqlRow& row) {
@@ -53,6 +63,20 @@ SqlCall AssignCall(const std::string& id, const CameraAssignment& assignment, ab
            {"snapshot", assignment.snapshot},
            {"now", absl::ToUnixMicros(now)},
            {"memory_bytes", assignment.memory_bytes},
+           {"neighbours", JoinCameraIndices(assignment.neighbours)},
+           {"spec", assignment.spec},
+           {"conductor_epoch", conductor_epoch}}};
+}
+
+SqlCall ProgressCall(const std::string& id, const StoredProgress& progress, int64_t conductor_epoch) {
+  return {"set_progress",
+          {{"id", id},
+           {"cameras_total", progress.cameras_total},
+           {"cameras_committed", progress.cameras_committed},
+           {"cameras_set_aside", progress.cameras_set_aside},
+           {"cameras_in_flight", progress.cameras_in_flight},
+           {"patches_filtered", progress.patches_filtered},
+           {"patches_accepted", progress.patches_accepted},
            {"conductor_epoch", conductor_epoch}}};
 }
 
@@ -72,6 +96,36 @@ SqlCall CommitCall(const std::string& id, const Commit& commit, absl::Time now, 
 
 std::string CameraJobName(const std::string& id, SequenceNumber sequence) {
   return absl::StrCat("camera job ", sequence, " of reconstruction ", id);
+}
+
+absl::StatusOr<ReconstructionState> ReadReconstructionState(const std::string& text) {
+  for (const auto& [state, name] : kStateTexts) {
+    if (text == name) return state;
+  }
+  return absl::DataLossError(absl::StrCat("a reconstruction has the unknown state ", text));
+}
+
+SqlCall CompleteCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& filtered_digest,
+                     const std::vector<CameraIndex>& weak_targets, const std::string& report_json, absl::Time now) {
+  return {"complete_camera_job",
+          {{"id", id},
+           {"sequence", sequence},
+           {"epoch", epoch},
+           {"filtered_digest", filtered_digest},
+           {"weak_targets", JoinCameraIndices(weak_targets)},
+           {"report_json", report_json},
+           {"now", absl::ToUnixMicros(now)}}};
+}
+
+SqlCall SetAsideCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason,
+                     bool out_of_memory, absl::Time now) {
+  return {"set_camera_job_aside",
+          {{"id", id},
+           {"sequence", sequence},
+           {"epoch", epoch},
+           {"reason", PrintableText(reason)},
+           {"ending", std::string(out_of_memory ? "out_of_memory" : "failed")},
+           {"now", absl::ToUnixMicros(now)}}};
 }
 
 absl::StatusOr<CameraJob> ReadCameraJob(const SqlRow& row) {
@@ -94,18 +148,29 @@ absl::StatusOr<CameraJob> ReadCameraJob(const SqlRow& row) {
   job.not_before = row.Time(14);
   job.lease_worker = row.Text(15);
   job.lease_expires_at = row.Time(16);
+  job.losses = row.Integer(17);
+  job.reduction = row.Integer(18);
+  job.expected_digest = row.Text(19);
+  MW_ASSIGN_OR_RETURN(job.neighbours, SplitCameraIndices(row.Text(20)));
+  job.lease_instance = row.Text(21);
+  job.leased_at = row.Time(22);
+  if (row.Columns() > 23) job.spec = row.Text(23);
   return job;
 }
 
 absl::Status SqlJobStore::CreateReconstruction(const Reconstruction& reconstruction, absl::Time now) {
+  const auto weight = static_cast<int64_t>(std::llround(reconstruction.weight * kWeightUnits));
   return database_
-      ->Run("create_reconstruction", {{"id", reconstruction.id},
-                                      {"options_json", reconstruction.options_json},
-                                      {"scene_digest", NullIfEmpty(reconstruction.scene_digest)},
-                                      {"state", StateText(reconstruction.state)},
-                                      {"now", absl::ToUnixMicros(now)},
-                                      {"reason", PrintableText(reconstruction.state_reason)},
-                                      {"weight", reconstruction.weight}})
+      ->RunAll({{"take_reconstruction_id", {{"id", reconstruction.id}}},
+                {"create_reconstruction",
+                 {{"id", reconstruction.id},
+                  {"options_json", reconstruction.options_json},
+                  {"scene_digest", NullIfEmpty(reconstruction.scene_digest)},
+                  {"state", StateText(reconstruction.state)},
+                  {"now", absl::ToUnixMicros(now)},
+                  {"reason", PrintableText(reconstruction.state_reason)},
+                  {"weight_thousandths", weight},
+                  {"scene_reference", reconstruction.scene_reference}}}})
       .status();
 }
 
@@ -127,25 +192,35 @@ absl::StatusOr<std::vector<Reconstruction>> SqlJobStore::ListReconstructions(con
   return all;
 }
 
-absl::Status SqlJobStore::SetReconstructionScene(const std::string& id, const std::string& scene_digest) {
-  MW_ASSIGN_OR_RETURN(
-      const SqlResult result,
-      database_->Run("set_reconstruction_scene", {{"id", id}, {"scene_digest", NullIfEmpty(scene_digest)}}));
+absl::Status SqlJobStore::SetReconstructionScene(const std::string& id, const std::string& scene_digest,
+                                                 const std::string& scene_blob, int64_t conductor_epoch) {
+  MW_ASSIGN_OR_RETURN(const SqlResult result,
+                      database_->Run("set_reconstruction_scene", {{"id", id},
+                                                                  {"scene_digest", NullIfEmpty(scene_digest)},
+                                                                  {"scene_blob", NullIfEmpty(scene_blob)},
+                                                                  {"conductor_epoch", conductor_epoch}}));
   if (result.changed == 1) return absl::OkStatus();
   MW_ASSIGN_OR_RETURN(const Reconstruction stored, GetReconstruction(id));
-  if (stored.scene_digest == scene_digest) return absl::OkStatus();
+  MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
+  if (stored.scene_digest == scene_digest && stored.scene_blob == scene_blob) return absl::OkStatus();
   return absl::FailedPreconditionError(
       absl::StrCat("reconstruction ", id, " is ", StateText(stored.state), "; its scene cannot change any more"));
 }
 
-absl::Status SqlJobStore::SetReconstructionState(const std::string& id, ReconstructionState state,
+absl::Status SqlJobStore::SetReconstructionState(const std::string& id, ReconstructionState state, absl::Time now,
                                                  const std::string& reason, int64_t conductor_epoch) {
   MW_ASSIGN_OR_RETURN(const SqlResult result,
                       database_->Run("set_reconstruction_state", {{"id", id},
                                                                   {"state", StateText(state)},
                                                                   {"reason", PrintableText(reason)},
+                                                                  {"is_final", IsFinal(state) ? 1 : 0},
+                                                                  {"now", absl::ToUnixMicros(now)},
                                                                   {"conductor_epoch", conductor_epoch}}));
   if (result.changed == 1) return absl::OkStatus();
+  return ExplainState(id, state, conductor_epoch);
+}
+
+absl::Status SqlJobStore::ExplainState(const std::string& id, ReconstructionState state, int64_t conductor_epoch) {
   MW_ASSIGN_OR_RETURN(const Reconstruction stored, GetReconstruction(id));
   MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
   if (stored.state == state) return absl::OkStatus();
@@ -153,26 +228,45 @@ absl::Status SqlJobStore::SetReconstructionState(const std::string& id, Reconstr
       absl::StrCat("reconstruction ", id, " is ", StateText(stored.state), ", which is final"));
 }
 
+absl::Status SqlJobStore::FinishReconstruction(const std::string& id, const StoredMesh& mesh, absl::Time now,
+                                               int64_t conductor_epoch) {
+  MW_ASSIGN_OR_RETURN(const SqlResult result,
+                      database_->Run("finish_reconstruction", {{"id", id},
+                                                               {"mesh_digest", mesh.digest},
+                                                               {"mesh_bytes", mesh.bytes},
+                                                               {"vertices", mesh.vertices},
+                                                               {"faces", mesh.faces},
+                                                               {"now", absl::ToUnixMicros(now)},
+                                                               {"conductor_epoch", conductor_epoch}}));
+  if (result.changed == 1) return absl::OkStatus();
+  return ExplainState(id, ReconstructionState::kDone, conductor_epoch);
+}
+
+absl::Status SqlJobStore::BeginDeletion(const std::string& id) {
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run("begin_deletion", {{"id", id}}));
+  return result.changed == 1 ? absl::OkStatus() : GetReconstruction(id).status();
+}
+
 absl::Status SqlJobStore::DeleteReconstruction(const std::string& id) {
   return database_->Run("delete_reconstruction", {{"id", id}}).status();
 }
 
-absl::Status SqlJobStore::AssignCameraJob(const std::string& id, SequenceNumber sequence, CameraIndex camera,
-                                          SequenceNumber snapshot, absl::Time now, int64_t conductor_epoch,
-                                          int64_t memory_bytes) {
-  const SqlCall call = AssignCall(id, {sequence, camera, snapshot, memory_bytes}, now, conductor_epoch);
+absl::Status SqlJobStore::AssignCameraJob(const std::string& id, const CameraAssignment& assignment, absl::Time now,
+                                          int64_t conductor_epoch) {
+  const SqlCall call = AssignCall(id, assignment, now, conductor_epoch);
   MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(call.statement, call.parameters));
   if (result.changed == 1) return absl::OkStatus();
   MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
-  const absl::StatusOr<CameraJob> stored = GetCameraJob(id, sequence);
+  const absl::StatusOr<CameraJob> stored = GetCameraJob(id, assignment.sequence);
   if (absl::IsNotFound(stored.status())) {
-    return absl::FailedPreconditionError(absl::StrCat("camera ", camera, " already has a job in reconstruction ", id));
+    return absl::FailedPreconditionError(
+        absl::StrCat("camera ", assignment.camera, " already has a job in reconstruction ", id));
   }
   MW_RETURN_IF_ERROR(stored.status());
-  if (stored->camera == camera && stored->snapshot == snapshot) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat(CameraJobName(id, sequence), " is camera ", stored->camera,
-                                                    " at snapshot ", stored->snapshot, ", not camera ", camera,
-                                                    " at snapshot ", snapshot));
+  if (stored->camera == assignment.camera && stored->snapshot == assignment.snapshot) return absl::OkStatus();
+  return absl::FailedPreconditionError(absl::StrCat(CameraJobName(id, assignment.sequence), " is camera ",
+                                                    stored->camera, " at snapshot ", stored->snapshot, ", not camera ",
+                                                    assignment.camera, " at snapshot ", assignment.snapshot));
 }
 
 absl::StatusOr<int64_t> SqlJobStore::ReassignCameraJob(const std::string& id, SequenceNumber sequence, absl::Time now) {
@@ -188,14 +282,8 @@ absl::Status SqlJobStore::CompleteCameraJob(const std::string& id, SequenceNumbe
                                             const std::string& filtered_digest,
                                             const std::vector<CameraIndex>& weak_targets,
                                             const std::string& report_json, absl::Time now) {
-  MW_ASSIGN_OR_RETURN(const SqlResult result,
-                      database_->Run("complete_camera_job", {{"id", id},
-                                                             {"sequence", sequence},
-                                                             {"epoch", epoch},
-                                                             {"filtered_digest", filtered_digest},
-                                                             {"weak_targets", JoinCameraIndices(weak_targets)},
-                                                             {"report_json", report_json},
-                                                             {"now", absl::ToUnixMicros(now)}}));
+  const SqlCall call = CompleteCall(id, sequence, epoch, filtered_digest, weak_targets, report_json, now);
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(call.statement, call.parameters));
   if (result.changed == 1) return absl::OkStatus();
   MW_ASSIGN_OR_RETURN(const CameraJob job, GetFencedCameraJob(id, sequence, epoch));
   if (job.state == CameraJobState::kDone && job.filtered_digest == filtered_digest) return absl::OkStatus();
@@ -204,16 +292,29 @@ absl::Status SqlJobStore::CompleteCameraJob(const std::string& id, SequenceNumbe
 
 absl::Status SqlJobStore::SetCameraJobAside(const std::string& id, SequenceNumber sequence, int64_t epoch,
                                             const std::string& reason, absl::Time now) {
-  MW_ASSIGN_OR_RETURN(const SqlResult result,
-                      database_->Run("set_camera_job_aside", {{"id", id},
-                                                              {"sequence", sequence},
-                                                              {"epoch", epoch},
-                                                              {"reason", PrintableText(reason)},
-                                                              {"now", absl::ToUnixMicros(now)}}));
+  const SqlCall call = SetAsideCall(id, sequence, epoch, reason, /*out_of_memory=*/false, now);
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(call.statement, call.parameters));
   if (result.changed == 1) return absl::OkStatus();
   MW_ASSIGN_OR_RETURN(const CameraJob job, GetFencedCameraJob(id, sequence, epoch));
   if (job.state == CameraJobState::kSetAside) return absl::OkStatus();
   return absl::FailedPreconditionError(absl::StrCat(CameraJobName(id, sequence), " is done already"));
+}
+
+absl::Status SqlJobStore::ReopenCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
+                                          const std::string& expected_digest, const std::string& reason,
+                                          absl::Time retry_at, int64_t conductor_epoch) {
+  MW_ASSIGN_OR_RETURN(const SqlResult result,
+                      database_->Run("reopen_camera_job", {{"id", id},
+                                                           {"sequence", sequence},
+                                                           {"epoch", epoch},
+                                                           {"expected_digest", NullIfEmpty(expected_digest)},
+                                                           {"reason", PrintableText(reason)},
+                                                           {"retry_at", absl::ToUnixMicros(retry_at)},
+                                                           {"conductor_epoch", conductor_epoch}}));
+  if (result.changed == 1) return absl::OkStatus();
+  MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
+  MW_RETURN_IF_ERROR(GetFencedCameraJob(id, sequence, epoch).status());
+  return absl::AbortedError(absl::StrCat(CameraJobName(id, sequence), " is not done"));
 }
 
 absl::StatusOr<CameraJob> SqlJobStore::GetCameraJob(const std::string& id, SequenceNumber sequence) {
@@ -233,6 +334,21 @@ absl::StatusOr<std::vector<CameraJob>> SqlJobStore::ListCameraJobs(const std::st
   return jobs;
 }
 
+absl::StatusOr<std::vector<JobResult>> SqlJobStore::ListResults(const std::string& id, SequenceNumber after) {
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run("list_outcomes", {{"id", id}, {"after", after}}));
+  std::vector<JobResult> results;
+  results.reserve(result.rows.size());
+  for (const SqlRow& row : result.rows) {
+    JobResult one = {.sequence = static_cast<SequenceNumber>(row.Integer(0)),
+                     .set_aside = row.Text(1) == "set_aside",
+                     .epoch = row.Integer(2),
+                     .filtered_digest = row.Text(3)};
+    MW_ASSIGN_OR_RETURN(one.weak_targets, SplitCameraIndices(row.Text(4)));
+    results.push_back(std::move(one));
+  }
+  return results;
+}
+
 absl::Status SqlJobStore::AddCommit(const std::string& id, const Commit& commit, absl::Time now,
                                     int64_t conductor_epoch) {
   const SqlCall call = CommitCall(id, commit, now, conductor_epoch);
@@ -247,25 +363,25 @@ absl::Status SqlJobStore::AddCommit(const std::string& id, const Commit& commit,
 }
 
 absl::Status SqlJobStore::Advance(const std::string& id, const std::vector<Commit>& commits,
-                                  const std::vector<CameraAssignment>& assignments, absl::Time now,
-                                  int64_t conductor_epoch) {
+                                  const std::vector<CameraAssignment>& assignments, const StoredProgress& progress,
+                                  absl::Time now, int64_t conductor_epoch) {
   std::vector<SqlCall> calls;
-  calls.reserve(commits.size() + assignments.size());
+  calls.reserve(commits.size() + assignments.size() + 1);
   for (const Commit& commit : commits) calls.push_back(CommitCall(id, commit, now, conductor_epoch));
   for (const CameraAssignment& assignment : assignments) {
     calls.push_back(AssignCall(id, assignment, now, conductor_epoch));
   }
-  if (calls.empty()) return absl::OkStatus();
+  calls.push_back(ProgressCall(id, progress, conductor_epoch));
   const absl::StatusOr<bool> done = database_->RunTogether(calls);
   if (done.ok() && *done) return absl::OkStatus();
   if (absl::IsUnavailable(done.status())) return done.status();
   // Something is there already, or is refused: one by one tells which, and why.
   for (const Commit& commit : commits) MW_RETURN_IF_ERROR(AddCommit(id, commit, now, conductor_epoch));
   for (const CameraAssignment& assignment : assignments) {
-    MW_RETURN_IF_ERROR(AssignCameraJob(id, assignment.sequence, assignment.camera, assignment.snapshot, now,
-                                       conductor_epoch, assignment.memory_bytes));
+    MW_RETURN_IF_ERROR(AssignCameraJob(id, assignment, now, conductor_epoch));
   }
-  return absl::OkStatus();
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(calls.back().statement, calls.back().parameters));
+  return result.changed == 1 ? absl::OkStatus() : CheckConductor(id, conductor_epoch);
 }
 
 absl::StatusOr<std::vector<Commit>> SqlJobStore::ListCommits(const std::string& id, SequenceNumber after) {

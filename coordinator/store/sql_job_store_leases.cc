@@ -1,119 +1,152 @@
 // Who holds what: leases of camera jobs, conductors of reconstructions, workers.
-#include <algorithm>
-#include <map>
-
 #include <absl/strings/str_cat.h>
-#include <nlohmann/json.hpp>
 
 #include "common/base/status_macros.h"
 #include "coordinator/store/sql_job_store.h"
 
 namespace meshwright {
 
-absl::StatusOr<std::vector<CameraLease>> SqlJobStore::RunForLeases(const std::string& statement,
-                                                                   const SqlParameters& parameters) {
-  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(statement, parameters));
-  std::vector<CameraLease> leases;
-  leases.reserve(result.rows.size());
-  for (const SqlRow& row : result.rows) {
-    MW_ASSIGN_OR_RETURN(CameraJob job, ReadCameraJob(row));
-    leases.push_back({row.Text(0), std::move(job)});
-  }
-  return leases;
-}
+namespace {
 
-absl::StatusOr<std::vector<CameraLease>> SqlJobStore::LeaseCameraJobs(const LeaseRequest& request) {
-  if (request.worker.empty()) return absl::InvalidArgumentError("a lease needs the name of a worker");
-  if (request.expires_at <= request.now) return absl::InvalidArgumentError("a lease must expire after now");
-  std::map<std::string, int64_t> turns;
-  nlohmann::json ids = nlohmann::json::array();
-  for (const std::string& id : request.reconstruction_ids) {
-    if (turns.emplace(id, ids.size()).second) ids.push_back(id);
-  }
-  MW_ASSIGN_OR_RETURN(
-      std::vector<CameraLease> leases,
-      RunForLeases("lease_camera_jobs",
-                   {{"worker", request.worker},
-                    {"reconstruction_ids", ids.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)},
-                    {"memory_bytes", request.memory_bytes},
-                    {"max_jobs", request.max_jobs},
-                    {"expires_at", absl::ToUnixMicros(request.expires_at)},
-                    {"now", absl::ToUnixMicros(request.now)}}));
-  // Databases return changed rows in no particular order.
-  const auto order = [&](const CameraLease& lease) {
-    const auto turn = turns.find(lease.reconstruction_id);
-    return std::tuple(turn == turns.end() ? 0 : turn->second, lease.job.sequence, lease.reconstruction_id);
+// A statement for each change.
+SqlCall ChangeCall(const JobChange& change, absl::Time now) {
+  SqlParameters parameters = {{"id", change.id}, {"sequence", change.sequence}, {"epoch", change.epoch}};
+  const auto with = [&](const char* statement, const SqlParameters& more) {
+    parameters.insert(parameters.end(), more.begin(), more.end());
+    return SqlCall{statement, parameters};
   };
-  std::sort(leases.begin(), leases.end(),
-            [&](const CameraLease& a, const CameraLease& b) { return order(a) < order(b); });
-  return leases;
-}
-
-absl::Status SqlJobStore::RenewLease(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                     const std::string& worker, absl::Time expires_at, absl::Time now) {
-  if (expires_at <= now) return absl::InvalidArgumentError("a lease must expire after now");
-  MW_ASSIGN_OR_RETURN(const SqlResult result,
-                      database_->Run("renew_lease", {{"id", id},
-                                                     {"sequence", sequence},
-                                                     {"epoch", epoch},
-                                                     {"worker", worker},
-                                                     {"expires_at", absl::ToUnixMicros(expires_at)}}));
-  if (result.changed == 1) return absl::OkStatus();
-  MW_RETURN_IF_ERROR(GetFencedCameraJob(id, sequence, epoch).status());
-  return absl::AbortedError(
-      absl::StrCat(CameraJobName(id, sequence), " is not held by worker ", worker, " any more (epoch ", epoch, ")"));
-}
-
-absl::Status SqlJobStore::ExplainGivenBack(const std::string& id, SequenceNumber sequence, int64_t epoch) {
-  MW_ASSIGN_OR_RETURN(const CameraJob job, GetFencedCameraJob(id, sequence, epoch));
-  if (job.state != CameraJobState::kAssigned) {
-    return absl::FailedPreconditionError(absl::StrCat(CameraJobName(id, sequence), " is finished already"));
+  switch (change.kind) {
+    case JobChange::Kind::kClaim:
+      return with("claim_camera_job", {{"worker", change.worker},
+                                       {"instance", change.instance},
+                                       {"expires_at", absl::ToUnixMicros(change.expires_at)},
+                                       {"now", absl::ToUnixMicros(now)}});
+    case JobChange::Kind::kRenew:
+      return with("renew_lease", {{"worker", change.worker}, {"expires_at", absl::ToUnixMicros(change.expires_at)}});
+    case JobChange::Kind::kComplete:
+      return CompleteCall(change.id, change.sequence, change.epoch, change.filtered_digest, change.weak_targets,
+                          change.report_json, now);
+    case JobChange::Kind::kSetAside:
+      return SetAsideCall(change.id, change.sequence, change.epoch, change.reason, change.out_of_memory, now);
+    case JobChange::Kind::kRelease:
+      return with("release_lease", {{"worker", change.worker},
+                                    {"retry_at", absl::ToUnixMicros(change.retry_at)},
+                                    {"now", absl::ToUnixMicros(now)}});
+    case JobChange::Kind::kFail:
+      return with("fail_lease", {{"worker", change.worker},
+                                 {"out_of_memory", change.out_of_memory ? 1 : 0},
+                                 {"reductions", change.reduce ? 1 : 0},
+                                 {"memory_bytes", change.memory_bytes},
+                                 {"reason", PrintableText(change.reason)},
+                                 {"retry_at", absl::ToUnixMicros(change.retry_at)},
+                                 {"now", absl::ToUnixMicros(now)}});
+    case JobChange::Kind::kLose:
+      return with("expire_lease", {{"worker", change.worker},
+                                   {"reason", PrintableText(change.reason)},
+                                   {"retry_at", absl::ToUnixMicros(change.retry_at)},
+                                   {"expired_at", absl::ToUnixMicros(change.only_if_expired_at)},
+                                   {"now", absl::ToUnixMicros(now)}});
   }
-  if (job.lease_worker.empty()) return absl::OkStatus();
-  return absl::AbortedError(absl::StrCat(CameraJobName(id, sequence), " is held by worker ", job.lease_worker,
-                                         " until ", absl::FormatTime(job.lease_expires_at, absl::UTCTimeZone())));
+  return {};
 }
 
-absl::Status SqlJobStore::ReleaseLease(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                       const std::string& worker, absl::Time) {
-  MW_ASSIGN_OR_RETURN(
-      const SqlResult result,
-      database_->Run("release_lease", {{"id", id}, {"sequence", sequence}, {"epoch", epoch}, {"worker", worker}}));
-  return result.changed == 1 ? absl::OkStatus() : ExplainGivenBack(id, sequence, epoch);
+absl::StatusOr<JobChangeResult> ReadChange(const JobChange& change, const SqlResult& result) {
+  JobChangeResult read;
+  if (change.kind == JobChange::Kind::kClaim && !result.rows.empty()) {
+    MW_ASSIGN_OR_RETURN(read.job, ReadCameraJob(result.rows.front()));
+  } else if (result.changed != 1) {
+    read.status =
+        absl::AbortedError(absl::StrCat(CameraJobName(change.id, change.sequence), " is not that of epoch ",
+                                        change.epoch, ", or not held by worker ", change.worker, ", any more"));
+  }
+  return read;
 }
 
-absl::Status SqlJobStore::FailLease(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                    const std::string& worker, const CameraJobFailure& failure, absl::Time) {
-  MW_ASSIGN_OR_RETURN(const SqlResult result,
-                      database_->Run("fail_lease", {{"id", id},
-                                                    {"sequence", sequence},
-                                                    {"epoch", epoch},
-                                                    {"worker", worker},
-                                                    {"reason", PrintableText(failure.reason)},
-                                                    {"out_of_memory", failure.out_of_memory ? 1 : 0},
-                                                    {"retry_at", absl::ToUnixMicros(failure.retry_at)}}));
-  return result.changed == 1 ? absl::OkStatus() : ExplainGivenBack(id, sequence, epoch);
+SqlCall HeartbeatCall(const WorkerRecord& worker) {
+  return {"record_heartbeat",
+          {{"worker", worker.id},
+           {"cores", worker.cores},
+           {"memory_bytes", worker.memory_bytes},
+           {"now", absl::ToUnixMicros(worker.last_heartbeat)},
+           {"instance", worker.instance},
+           {"version", worker.version},
+           {"draining", worker.draining ? 1 : 0}}};
 }
 
-absl::Status SqlJobStore::ExpireLease(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                      const CameraJobFailure& failure, absl::Time now) {
-  MW_ASSIGN_OR_RETURN(const SqlResult result,
-                      database_->Run("expire_lease", {{"id", id},
-                                                      {"sequence", sequence},
-                                                      {"epoch", epoch},
-                                                      {"reason", PrintableText(failure.reason)},
-                                                      {"out_of_memory", failure.out_of_memory ? 1 : 0},
-                                                      {"retry_at", absl::ToUnixMicros(failure.retry_at)},
-                                                      {"now", absl::ToUnixMicros(now)}}));
-  return result.changed == 1 ? absl::OkStatus() : ExplainGivenBack(id, sequence, epoch);
+}  // namespace
+
+absl::StatusOr<std::vector<OpenJob>> SqlJobStore::ListOpenJobs() {
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run("list_open_jobs", {}));
+  std::vector<OpenJob> jobs;
+  jobs.reserve(result.rows.size());
+  for (const SqlRow& row : result.rows) {
+    jobs.push_back({.reconstruction_id = row.Text(0),
+                    .weight = static_cast<double>(row.Integer(13)) / 1000,
+                    .sequence = static_cast<SequenceNumber>(row.Integer(1)),
+                    .camera = static_cast<CameraIndex>(row.Integer(2)),
+                    .epoch = row.Integer(3),
+                    .memory_bytes = row.Integer(4),
+                    .failed_attempts = row.Integer(5),
+                    .losses = row.Integer(6),
+                    .reduction = row.Integer(7),
+                    .is_repair = row.Integer(14) != 0,
+                    .not_before = row.Time(8),
+                    .lease_worker = row.Text(9),
+                    .lease_instance = row.Text(10),
+                    .leased_at = row.Time(11),
+                    .lease_expires_at = row.Time(12)});
+  }
+  return jobs;
 }
 
-absl::StatusOr<std::vector<CameraLease>> SqlJobStore::ListExpiredLeases(absl::Time now) {
-  return RunForLeases("list_expired_leases", {{"now", absl::ToUnixMicros(now)}});
+absl::StatusOr<std::vector<JobChangeResult>> SqlJobStore::ApplyChanges(const std::vector<JobChange>& changes,
+                                                                       const std::vector<WorkerRecord>& heartbeats,
+                                                                       absl::Time now) {
+  std::vector<JobChangeResult> results;
+  if (changes.empty() && heartbeats.empty()) return results;
+  std::vector<SqlCall> calls;
+  calls.reserve(changes.size() + heartbeats.size());
+  for (const JobChange& change : changes) calls.push_back(ChangeCall(change, now));
+  for (const WorkerRecord& worker : heartbeats) calls.push_back(HeartbeatCall(worker));
+  const absl::StatusOr<std::vector<SqlResult>> together = database_->RunAll(calls);
+  if (together.ok()) {
+    for (size_t i = 0; i < changes.size(); ++i) {
+      MW_ASSIGN_OR_RETURN(JobChangeResult read, ReadChange(changes[i], (*together)[i]));
+      results.push_back(std::move(read));
+    }
+    return results;
+  }
+  if (absl::IsUnavailable(together.status()) || absl::IsResourceExhausted(together.status())) return together.status();
+  // One of them cannot be stored: the others shall not suffer for it.
+  for (size_t i = 0; i < calls.size(); ++i) {
+    const absl::StatusOr<SqlResult> alone = database_->Run(calls[i].statement, calls[i].parameters);
+    if (i >= changes.size()) continue;
+    if (absl::IsUnavailable(alone.status())) return alone.status();
+    JobChangeResult& result = results.emplace_back();
+    if (!alone.ok()) {
+      result.status = alone.status();
+      continue;
+    }
+    MW_ASSIGN_OR_RETURN(result, ReadChange(changes[i], *alone));
+  }
+  return results;
 }
 
-absl::StatusOr<std::vector<CameraLease>> SqlJobStore::ListLeases(const std::string& worker) {
-  return RunForLeases("list_leases", {{"worker", worker}});
+absl::StatusOr<std::vector<Attempt>> SqlJobStore::ListAttempts(const std::string& id, int64_t limit) {
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run("list_attempts", {{"id", id}, {"limit", limit}}));
+  std::vector<Attempt> attempts;
+  attempts.reserve(result.rows.size());
+  for (const SqlRow& row : result.rows) {
+    attempts.push_back({.sequence = static_cast<SequenceNumber>(row.Integer(0)),
+                        .camera = static_cast<CameraIndex>(row.Integer(1)),
+                        .epoch = row.Integer(2),
+                        .worker = row.Text(3),
+                        .began_at = row.Time(4),
+                        .ended_at = row.Time(5),
+                        .ending = row.Text(6),
+                        .reason = row.Text(7)});
+  }
+  return attempts;
 }
 
 absl::Status SqlJobStore::CheckConductor(const std::string& id, int64_t epoch) {
@@ -162,21 +195,17 @@ absl::StatusOr<ConductorLease> SqlJobStore::GetConductorLease(const std::string&
   return ConductorLease{.owner = row.Text(0), .epoch = row.Integer(1), .expires_at = row.Time(2)};
 }
 
-absl::StatusOr<std::vector<std::string>> SqlJobStore::ListUnconductedReconstructions(absl::Time now) {
-  MW_ASSIGN_OR_RETURN(const SqlResult result,
-                      database_->Run("list_unconducted_reconstructions", {{"now", absl::ToUnixMicros(now)}}));
-  std::vector<std::string> ids;
-  ids.reserve(result.rows.size());
-  for (const SqlRow& row : result.rows) ids.push_back(row.Text(0));
-  return ids;
-}
-
-absl::Status SqlJobStore::RecordHeartbeat(const std::string& worker, int64_t cores, int64_t memory_bytes,
-                                          absl::Time now) {
-  return database_
-      ->Run("record_heartbeat",
-            {{"worker", worker}, {"cores", cores}, {"memory_bytes", memory_bytes}, {"now", absl::ToUnixMicros(now)}})
-      .status();
+absl::StatusOr<std::vector<ConductedState>> SqlJobStore::ListConducted() {
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run("list_conducted", {}));
+  std::vector<ConductedState> all;
+  all.reserve(result.rows.size());
+  for (const SqlRow& row : result.rows) {
+    MW_ASSIGN_OR_RETURN(const ReconstructionState state, ReadReconstructionState(row.Text(1)));
+    all.push_back({.id = row.Text(0),
+                   .state = state,
+                   .lease = {.owner = row.Text(2), .epoch = row.Integer(3), .expires_at = row.Time(4)}});
+  }
+  return all;
 }
 
 absl::Status SqlJobStore::SetWorkerDrained(const std::string& worker, bool drained) {
@@ -194,13 +223,16 @@ absl::StatusOr<std::vector<WorkerRecord>> SqlJobStore::ListWorkers() {
                        .cores = row.Integer(1),
                        .memory_bytes = row.Integer(2),
                        .last_heartbeat = row.Time(3),
-                       .drained = row.Integer(4) != 0});
+                       .drained = row.Integer(4) != 0,
+                       .instance = row.Text(5),
+                       .version = row.Text(6),
+                       .draining = row.Integer(7) != 0});
   }
   return workers;
 }
 
-absl::Status SqlJobStore::RemoveWorker(const std::string& worker) {
-  return database_->Run("remove_worker", {{"worker", worker}}).status();
+absl::Status SqlJobStore::RemoveSilentWorkers(absl::Time before) {
+  return database_->Run("remove_silent_workers", {{"before", absl::ToUnixMicros(before)}}).status();
 }
 
 }  // namespace meshwright

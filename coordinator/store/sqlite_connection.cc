@@ -14,7 +14,6 @@ namespace meshwright {
 
 // Compiled in from sql/sqlite (see CMakeLists.txt).
 const std::vector<std::pair<std::string, std::string>>& SqliteMigrations();
-const std::vector<std::pair<std::string, std::string>>& SqliteStatements();
 
 namespace {
 
@@ -105,7 +104,6 @@ std::string SqliteStatement::Text(int column) const {
 
 SqliteConnection::SqliteConnection(std::string path) : path_(std::move(path)) {
   statements_ = ParseSqlStatements(CommonStatements());
-  statements_.merge(ParseSqlStatements(SqliteStatements()));
 }
 
 SqliteConnection::SqliteConnection(SqliteConnection&& other) noexcept

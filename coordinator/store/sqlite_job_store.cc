@@ -2,6 +2,7 @@
 
 #include <mutex>
 #include <utility>
+#include <vector>
 
 #include <absl/strings/str_cat.h>
 
@@ -22,24 +23,34 @@ class SqliteDatabase : public SqlDatabase {
   }
 
   absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>& calls) override {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    bool all_changed = true;
-    const absl::Status status = connection_.Transaction([&]() -> absl::Status {
-      for (const SqlCall& call : calls) {
-        MW_ASSIGN_OR_RETURN(const SqlResult result, RunLocked(call.statement, call.parameters));
-        all_changed = result.changed == 1;
-        if (!all_changed) return absl::CancelledError("rolled back");
-      }
-      return absl::OkStatus();
-    });
-    if (!all_changed) return false;
+    const absl::Status status = RunTransaction(calls, /*each_changes_one_row=*/true).status();
+    if (absl::IsCancelled(status)) return false;
     MW_RETURN_IF_ERROR(status);
     return true;
+  }
+
+  absl::StatusOr<std::vector<SqlResult>> RunAll(const std::vector<SqlCall>& calls) override {
+    return RunTransaction(calls, /*each_changes_one_row=*/false);
   }
 
   absl::StatusOr<absl::Time> Now() override { return clock_->Now(); }
 
  private:
+  // Cancelled: one did not change exactly one row, and nothing was changed.
+  absl::StatusOr<std::vector<SqlResult>> RunTransaction(const std::vector<SqlCall>& calls, bool each_changes_one_row) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::vector<SqlResult> results;
+    MW_RETURN_IF_ERROR(connection_.Transaction([&]() -> absl::Status {
+      for (const SqlCall& call : calls) {
+        MW_ASSIGN_OR_RETURN(SqlResult result, RunLocked(call.statement, call.parameters));
+        if (each_changes_one_row && result.changed != 1) return absl::CancelledError("rolled back");
+        results.push_back(std::move(result));
+      }
+      return absl::OkStatus();
+    }));
+    return results;
+  }
+
   absl::StatusOr<SqlResult> RunLocked(const std::string& name, const SqlParameters& parameters) {
     MW_ASSIGN_OR_RETURN(SqliteStatement statement, connection_.Prepare(name));
     for (const auto& [parameter, value] : parameters) {

@@ -23,7 +23,7 @@ constexpr CountedStatement kCountedStatements[] = {
     {"create_reconstruction", nullptr, nullptr, nullptr, "reconstruction created", false},
     {"set_reconstruction_state", nullptr, nullptr, nullptr, "reconstruction ended", false},
     {"delete_reconstruction", nullptr, nullptr, nullptr, "reconstruction deleted", false},
-    {"lease_camera_jobs", "meshwright_leases_granted_total", "Camera jobs handed out to workers.", nullptr,
+    {"claim_camera_job", "meshwright_leases_granted_total", "Camera jobs handed out to workers.", nullptr,
      "jobs leased", false},
     {"renew_lease", "meshwright_leases_renewed_total", "Leases prolonged because their worker was heard of.", nullptr,
      nullptr, false},
@@ -97,6 +97,18 @@ absl::StatusOr<bool> MeasuredSqlDatabase::RunTogether(const std::vector<SqlCall>
     for (const SqlCall& call : calls) CountChanges(call.statement, call.parameters, 0, 1);
   }
   return changed;
+}
+
+absl::StatusOr<std::vector<SqlResult>> MeasuredSqlDatabase::RunAll(const std::vector<SqlCall>& calls) {
+  const absl::Time begun = absl::Now();
+  absl::StatusOr<std::vector<SqlResult>> results = database_->RunAll(calls);
+  Record("transaction", begun, results.status());
+  if (!results.ok()) return results;
+  for (size_t i = 0; i < calls.size(); ++i) {
+    const SqlResult& result = (*results)[i];
+    CountChanges(calls[i].statement, calls[i].parameters, static_cast<int64_t>(result.rows.size()), result.changed);
+  }
+  return results;
 }
 
 void MeasuredSqlDatabase::Record(const std::string& operation, absl::Time begun, const absl::Status& status) {

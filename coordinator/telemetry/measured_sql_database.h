@@ -23,6 +23,7 @@ class MeasuredSqlDatabase final : public SqlDatabase {
 
   absl::StatusOr<SqlResult> Run(const std::string& statement, const SqlParameters& parameters) override;
   absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>& calls) override;
+  absl::StatusOr<std::vector<SqlResult>> RunAll(const std::vector<SqlCall>& calls) override;
   absl::StatusOr<absl::Time> Now() override { return database_->Now(); }
 
  private:

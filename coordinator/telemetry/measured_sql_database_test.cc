@@ -36,7 +36,8 @@ class MeasuredStoreTest : public testing::Test {
     });
     ASSERT_TRUE(store.ok()) << store.status();
     store_ = *std::move(store);
-    AddClusterGauges(metrics_, *database_, workers_, folder_);
+    workers_ = std::make_unique<WorkerLogic>(LeaseOptions(), RetryOptions(), *store_);
+    AddClusterGauges(metrics_, *database_, *workers_, folder_);
     ASSERT_TRUE(store_
                     ->CreateReconstruction({.id = "r", .options_json = "{}", .scene_digest = std::string(64, 'a')},
                                            clock_.Now())
@@ -47,44 +48,49 @@ class MeasuredStoreTest : public testing::Test {
     std::filesystem::remove_all(folder_);
   }
   void Assign(SequenceNumber sequence) {
-    ASSERT_TRUE(store_->AssignCameraJob("r", sequence, sequence, sequence - 1, clock_.Now()).ok());
+    ASSERT_TRUE(store_->AssignCameraJob("r", {sequence, sequence, sequence - 1}, clock_.Now()).ok());
   }
-  CameraLease Lease() {
-    const auto leases =
-        store_->LeaseCameraJobs({.worker = "w", .expires_at = clock_.Now() + absl::Seconds(10), .now = clock_.Now()});
-    return leases->at(0);
+  // What a turn of a coordinator changes about job 1; returns its epoch.
+  int64_t Change(JobChange::Kind kind, int64_t epoch) {
+    const auto results = store_->ApplyChanges({{.kind = kind,
+                                                .id = "r",
+                                                .sequence = 1,
+                                                .epoch = epoch,
+                                                .worker = "w",
+                                                .expires_at = clock_.Now() + absl::Seconds(10),
+                                                .reason = "x"}},
+                                              {}, clock_.Now());
+    EXPECT_TRUE(results.ok()) << results.status();
+    return store_->GetCameraJob("r", 1)->epoch;
   }
   void ExpectLine(const std::string& line) { EXPECT_THAT(metrics_.Text(), HasSubstr("\n" + line + "\n")); }
 
   std::string folder_;
   ManualClock clock_;
-  WorkerLogic workers_{LeaseOptions(), clock_};
   Metrics metrics_{"coordinator"};
   std::vector<std::string> lines_;
   SqlDatabase* database_ = nullptr;
   std::unique_ptr<JobStore> store_;
+  std::unique_ptr<WorkerLogic> workers_;
 };
 
 TEST_F(MeasuredStoreTest, LeasesAreCountedByHowTheyEnd) {
   Assign(1);
-  const auto later = [&] { return CameraJobFailure{.reason = "x", .retry_at = clock_.Now()}; };
-  CameraLease lease = Lease();
-  ASSERT_TRUE(store_->RenewLease("r", 1, lease.job.epoch, "w", clock_.Now() + absl::Seconds(9), clock_.Now()).ok());
-  ASSERT_TRUE(store_->ReleaseLease("r", 1, lease.job.epoch, "w", clock_.Now()).ok());
-  lease = Lease();
-  ASSERT_TRUE(store_->FailLease("r", 1, lease.job.epoch, "w", later(), clock_.Now()).ok());
-  ASSERT_TRUE(store_->FailLease("r", 1, lease.job.epoch, "w", later(), clock_.Now()).ok());  // a repetition
-  lease = Lease();
-  clock_.Advance(absl::Minutes(1));
-  ASSERT_TRUE(store_->ExpireLease("r", 1, lease.job.epoch, later(), clock_.Now()).ok());
-  lease = Lease();
-  ASSERT_TRUE(store_->CompleteCameraJob("r", 1, lease.job.epoch, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
+  int64_t epoch = Change(JobChange::Kind::kClaim, 1);
+  Change(JobChange::Kind::kRenew, epoch);
+  Change(JobChange::Kind::kRelease, epoch);
+  epoch = Change(JobChange::Kind::kClaim, epoch);
+  Change(JobChange::Kind::kFail, epoch);
+  Change(JobChange::Kind::kFail, epoch);  // a repetition
+  epoch = Change(JobChange::Kind::kClaim, epoch);
+  Change(JobChange::Kind::kLose, epoch);
+  epoch = Change(JobChange::Kind::kClaim, epoch);
+  ASSERT_TRUE(store_->CompleteCameraJob("r", 1, epoch, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
   ExpectLine("meshwright_leases_granted_total 4");
   ExpectLine("meshwright_leases_renewed_total 1");
   for (const char* const outcome : {"finished", "failed", "given_back", "lost"}) {
     ExpectLine(std::string("meshwright_leases_ended_total{outcome=\"") + outcome + "\"} 1");
   }
-  ExpectLine("meshwright_store_seconds_count{operation=\"lease_camera_jobs\"} 4");
   EXPECT_THAT(metrics_.Text(), Not(HasSubstr("meshwright_store_errors_total{")));
 }
 
@@ -106,7 +112,8 @@ TEST_F(MeasuredStoreTest, CommitsBringAcceptedRaysAlsoInTransactions) {
   ASSERT_TRUE(store_->AddCommit("r", commit(1, 100), clock_.Now()).ok());
   ASSERT_TRUE(store_->AddCommit("r", commit(1, 100), clock_.Now()).ok());  // a repetition
   ASSERT_TRUE(
-      store_->Advance("r", {commit(2, 20), commit(3, 0)}, {{.sequence = 4, .camera = 4, .snapshot = 3}}, clock_.Now())
+      store_
+          ->Advance("r", {commit(2, 20), commit(3, 0)}, {{.sequence = 4, .camera = 4, .snapshot = 3}}, {}, clock_.Now())
           .ok());
   ExpectLine("meshwright_commits_total 3");
   ExpectLine("meshwright_rays_accepted_total 120");
@@ -140,7 +147,7 @@ TEST_F(MeasuredStoreTest, GaugesFollowTheStore) {
   ASSERT_TRUE(store_->AddCommit("r", {.sequence = 1, .camera = 1}, clock_.Now()).ok());
   ExpectLine("meshwright_longest_without_commit_seconds 0");
   // Jobs of what does not run are no queue.
-  ASSERT_TRUE(store_->SetReconstructionState("r", ReconstructionState::kCancelled).ok());
+  ASSERT_TRUE(store_->SetReconstructionState("r", ReconstructionState::kCancelled, clock_.Now()).ok());
   ExpectLine("meshwright_jobs_waiting 0");
   ExpectLine("meshwright_reconstructions{state=\"cancelled\"} 1");
   ExpectLine("meshwright_reconstructions{state=\"running\"} 0");
@@ -152,7 +159,7 @@ TEST_F(MeasuredStoreTest, WorkersAndTheDiskAreSeen) {
   request.set_instance("i");
   request.set_cores(3);
   request.set_memory_bytes(1 << 30);
-  ASSERT_TRUE(workers_.Synchronize(request, [] { return false; }).ok());
+  ASSERT_TRUE(workers_->Synchronize(request, [] { return false; }).ok());
   ExpectLine("meshwright_workers 1");
   ExpectLine("meshwright_workers_cores 3");
   ExpectLine("meshwright_workers_draining 0");
@@ -166,7 +173,6 @@ TEST(MeasuredPostgresTest, CountsAndGaugesAreThose) {
   const PostgresSchema schema(*server);
   const RealClock clock;
   Metrics metrics("coordinator");
-  const WorkerLogic workers(LeaseOptions(), clock);
   SqlDatabase* database = nullptr;
   const auto store = OpenPostgresJobStore(schema.url(), {}, [&](std::unique_ptr<SqlDatabase> unmeasured) {
     auto measured = std::make_unique<MeasuredSqlDatabase>(std::move(unmeasured), metrics, Logger::Nowhere());
@@ -174,6 +180,7 @@ TEST(MeasuredPostgresTest, CountsAndGaugesAreThose) {
     return measured;
   });
   ASSERT_TRUE(store.ok()) << store.status();
+  const WorkerLogic workers(LeaseOptions(), RetryOptions(), **store);
   AddClusterGauges(metrics, *database, workers, "/");
   const absl::Time now = clock.Now();
   ASSERT_TRUE((*store)
@@ -182,7 +189,7 @@ TEST(MeasuredPostgresTest, CountsAndGaugesAreThose) {
                   .ok());
   EXPECT_THAT(metrics.Text(), testing::ContainsRegex("\nmeshwright_longest_without_commit_seconds 72[0-9][0-9]"));
   for (const SequenceNumber sequence : {1, 2}) {
-    ASSERT_TRUE((*store)->AssignCameraJob("r", sequence, sequence, 0, now).ok());
+    ASSERT_TRUE((*store)->AssignCameraJob("r", {sequence, sequence, 0}, now).ok());
   }
   ASSERT_TRUE((*store)->CompleteCameraJob("r", 1, 1, std::string(64, 'b'), {}, "{}", now).ok());
   ASSERT_TRUE((*store)->AddCommit("r", {.sequence = 1, .camera = 1}, now).ok());
@@ -203,6 +210,9 @@ class BrokenDatabase final : public SqlDatabase {
     return absl::UnavailableError("gone");
   }
   absl::StatusOr<bool> RunTogether(const std::vector<SqlCall>&) override { return absl::UnavailableError("gone"); }
+  absl::StatusOr<std::vector<SqlResult>> RunAll(const std::vector<SqlCall>&) override {
+    return absl::UnavailableError("gone");
+  }
   absl::StatusOr<absl::Time> Now() override { return absl::UnavailableError("gone"); }
 };
 

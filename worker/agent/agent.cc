@@ -47,6 +47,7 @@ absl::StatusOr<CameraJobSpec> ToSpec(const v1::CameraJob& job, size_t cameras) {
                         .camera = job.camera(),
                         .snapshot = job.snapshot(),
                         .epoch = job.key().epoch(),
+                        .reduction = job.reduction(),
                         .neighbours = {job.neighbours().begin(), job.neighbours().end()},
                         .targets = {job.targets().begin(), job.targets().end()}};
   for (const v1::AcceptedSurface& surface : job.accepted()) {
@@ -73,7 +74,7 @@ Agent::Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blo
       blobs_(blobs),
       job_(std::move(job)),
       log_(std::move(log)),
-      contexts_(blobs, std::move(parse), options.memory_bytes / kCacheShare),
+      contexts_(blobs_, std::move(parse), options.memory_bytes / kCacheShare),
       pool_(options.cores) {}
 
 Agent::~Agent() {
@@ -98,6 +99,7 @@ v1::SynchronizeRequest Agent::NextRequest() {
   request.set_instance(instance_);
   request.set_version(options_.version);
   request.set_memory_bytes(options_.memory_bytes);
+  request.set_ran_out_of_memory(options_.ran_out_of_memory);
   const std::lock_guard<std::mutex> lock(mutex_);
   int lost_cores = 0;
   for (auto& [key, held] : held_) {
@@ -182,7 +184,7 @@ v1::HeldJob Agent::Process(const v1::CameraJob& job) {
   *told.mutable_key() = job.key();
   const auto process = [&]() -> absl::StatusOr<FinishedJob> {
     MW_ASSIGN_OR_RETURN(const std::shared_ptr<const JobContext> context,
-                        contexts_.For(job.scene_digest(), job.options_json()));
+                        contexts_.For(job.scene_digest(), job.options_json(), job.reduction()));
     MW_ASSIGN_OR_RETURN(const CameraJobSpec spec, ToSpec(job, context->cameras.size()));
     const CameraJobFunction function = [&](const CameraJobInput& input, ThreadPool& pool) {
       return job_(input, context->method.job, pool);
@@ -199,9 +201,11 @@ v1::HeldJob Agent::Process(const v1::CameraJob& job) {
     } else {
       told.mutable_failed()->set_reason(std::string(finished.status().message()));
       told.mutable_failed()->set_infrastructure(!IsJobsFault(finished.status()));
+      told.mutable_failed()->set_damaged_blob(LostBlobOf(finished.status()));
     }
   } catch (const std::bad_alloc&) {
     told.mutable_failed()->set_reason("out of memory");
+    told.mutable_failed()->set_out_of_memory(true);
   }
   return told;
 }

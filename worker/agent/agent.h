@@ -16,6 +16,7 @@
 
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
+#include "common/blob/lost_blob.h"
 #include "common/telemetry/log.h"
 #include "worker/agent/job_contexts.h"
 #include "worker/agent/worker_channel.h"
@@ -28,6 +29,8 @@ struct AgentOptions {
   int cores = 1;                             // jobs at the same time, and cores of all of them together
   int64_t memory_bytes = 1 << 30;            // what jobs may take together
   absl::Duration drain = absl::Seconds(30);  // after Drain(), jobs may take so long before they are given back
+  // The process of this worker before this one was killed since memory ran out.
+  bool ran_out_of_memory = false;
 };
 
 // What RunCameraJob is, or something quick in tests.
@@ -67,7 +70,7 @@ class Agent {
   const AgentOptions options_;
   const std::string instance_;
   WorkerChannel& channel_;
-  BlobStore& blobs_;
+  LostBlobNamer blobs_;
   const AgentJob job_;
   const Logger log_;
   JobContexts contexts_;

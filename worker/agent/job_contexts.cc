@@ -1,5 +1,6 @@
 #include "worker/agent/job_contexts.h"
 
+#include <algorithm>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -12,15 +13,23 @@ namespace meshwright {
 namespace {
 
 constexpr size_t kMaxKept = 3;
+constexpr int kWidestLattice = 16;
 
 }  // namespace
+
+CameraJobOptions Reduced(CameraJobOptions options, int reduction) {
+  for (; reduction > 0 && options.lattice_step < kWidestLattice; --reduction) {
+    options.lattice_step = std::min(2 * options.lattice_step, kWidestLattice);
+  }
+  return options;
+}
 
 JobContexts::JobContexts(BlobStore& blobs, ParseJobMethod parse, int64_t cache_bytes)
     : blobs_(blobs), parse_(std::move(parse)), cache_bytes_(cache_bytes) {}
 
 absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::For(const std::string& scene_digest,
-                                                                   const std::string& options_json) {
-  const std::string key = absl::StrCat(scene_digest, " ", options_json);
+                                                                   const std::string& options_json, int reduction) {
+  const std::string key = absl::StrCat(scene_digest, " ", reduction, " ", options_json);
   // Two jobs that want the same scene at the same time load it once; others wait, which is rare.
   const std::lock_guard<std::mutex> lock(mutex_);
   for (auto it = kept_.begin(); it != kept_.end(); ++it) {
@@ -28,16 +37,17 @@ absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::For(const std::st
     kept_.splice(kept_.begin(), kept_, it);
     return it->context;
   }
-  MW_ASSIGN_OR_RETURN(std::shared_ptr<const JobContext> context, Make(scene_digest, options_json));
+  MW_ASSIGN_OR_RETURN(std::shared_ptr<const JobContext> context, Make(scene_digest, options_json, reduction));
   kept_.push_front({key, context});
   if (kept_.size() > kMaxKept) kept_.pop_back();
   return context;
 }
 
 absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::Make(const std::string& scene_digest,
-                                                                    const std::string& options_json) {
+                                                                    const std::string& options_json, int reduction) {
   auto context = std::make_shared<JobContext>();
   MW_ASSIGN_OR_RETURN(context->method, parse_(options_json));
+  context->method.job = Reduced(context->method.job, reduction);
   MW_ASSIGN_OR_RETURN(const std::string bytes, blobs_.Get(scene_digest));
   MW_ASSIGN_OR_RETURN(context->scene, DecodeScene(bytes));
   const int max_image_size = context->method.max_image_size;

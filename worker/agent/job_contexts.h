@@ -22,6 +22,10 @@ struct JobMethod {
   int max_image_size = 0;  // px, 0: as they are
   CameraJobOptions job;
 };
+// What is left of the options when a job is made smaller after it ran out of memory: the lattice is spaced twice as
+// wide each time, up to the widest.
+CameraJobOptions Reduced(CameraJobOptions options, int reduction);
+
 // InvalidArgument names the option.
 using ParseJobMethod = std::function<absl::StatusOr<JobMethod>(const std::string& options_json)>;
 
@@ -41,12 +45,13 @@ class JobContexts {
   JobContexts(BlobStore& blobs, ParseJobMethod parse, int64_t cache_bytes);
 
   // Errors are the BlobStore's and the parser's.
+  // `reduction`: how many times the jobs were made smaller; each doubles the spacing of the lattice.
   absl::StatusOr<std::shared_ptr<const JobContext>> For(const std::string& scene_digest,
-                                                        const std::string& options_json);
+                                                        const std::string& options_json, int reduction);
 
  private:
   absl::StatusOr<std::shared_ptr<const JobContext>> Make(const std::string& scene_digest,
-                                                         const std::string& options_json);
+                                                         const std::string& options_json, int reduction);
 
   struct Kept {
     std::string key;
