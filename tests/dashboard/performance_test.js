@@ -1,6 +1,7 @@
 // Budgets: 5,000 cameras and 20 million faces, while more come.
 import assert from 'node:assert/strict';
 import { readFileSync, readdirSync } from 'node:fs';
+import { availableParallelism, loadavg } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { gzipSync } from 'node:zlib';
@@ -10,6 +11,14 @@ import { FakeApi } from './fake_api/server.js';
 const MOST_SCRIPT_BYTES = 400_000;
 const LONGEST_PAINT_MS = 2000;
 const LONGEST_TASK_MS = 200;
+
+// Where others have the processors too, a page waits for its turn: then the clock is not held to the budgets, and says so.
+function othersAreBusy() {
+  const [load] = loadavg();
+  if (load < availableParallelism()) return false;
+  console.log(`# the machine is busy (load ${load.toFixed(1)}): the clock is not held to the budget`);
+  return true;
+}
 
 let browser;
 let api;
@@ -43,6 +52,7 @@ for (const [name, hash, useful] of [
   ['a reconstruction of 5,000 cameras', '#/reconstructions/campaign', '.summary dd'],
 ]) {
   test(`${name} is there within two seconds`, async (t) => {
+    const busy = othersAreBusy();
     const page = await openPage(t, browser, 'about:blank');
     await page.addInitScript((selector) => {
       new MutationObserver((_, observer) => {
@@ -56,7 +66,7 @@ for (const [name, hash, useful] of [
     const usefulAt = await until(() => page.evaluate(() => globalThis.usefulAt));
     const first = await page.evaluate(() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime);
     console.log(`# ${name}: first paint ${first?.toFixed(0)} ms, useful ${usefulAt.toFixed(0)} ms`);
-    assert.ok(usefulAt < LONGEST_PAINT_MS);
+    if (!busy) assert.ok(usefulAt < LONGEST_PAINT_MS);
   });
 }
 
@@ -74,6 +84,7 @@ function tasksOf(trace) {
 }
 
 test('no task takes longer than 200 ms with 5,000 cameras and 20 million faces', { timeout: 180_000 }, async (t) => {
+  const busy = othersAreBusy();
   const page = await openPage(t, browser, 'about:blank');
   await browser.startTracing(page, {
     categories: ['toplevel', 'devtools.timeline', 'disabled-by-default-devtools.timeline'],
@@ -110,7 +121,5 @@ test('no task takes longer than 200 ms with 5,000 cameras and 20 million faces',
   assert.ok(numbers.faces > 15e6);
   const longest = (measure) => Math.max(...tasks.map((task) => task[measure]));
   assert.ok(longest('processorMs') < LONGEST_TASK_MS);
-  // Where others have the processors too, a task may take long by waiting for its turn.
-  if (busyBefore < availableParallelism()) assert.ok(longest('ms') < LONGEST_TASK_MS);
-  else console.log(`# the machine is busy (load ${busyBefore.toFixed(1)}): the clock was not held to the budget`);
+  if (!busy) assert.ok(longest('ms') < LONGEST_TASK_MS);
 });

@@ -76,6 +76,8 @@ export class SceneViewer {
       antialias: !this.inSoftware,
       powerPreference: 'high-performance',
     });
+    // Asking how a shader was compiled makes the page wait until it is.
+    this.renderer.debug.checkShaderErrors = import.meta.env.DEV;
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.scene.add(this.parts.mesh, this.frusta.lines, new AmbientLight(0xffffff, 1.1), this.light);
     this.view.up.copy(this.up);
