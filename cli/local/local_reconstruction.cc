@@ -226,7 +226,9 @@ class LocalReconstruction {
                       {"stitch_faces", counts.stitch_faces},
                       {"holes_filled", counts.holes_filled},
                       {"hole_faces", counts.hole_faces},
-                      {"components_removed", counts.components_removed}};
+                      {"components_removed", counts.components_removed},
+                      {"faces_simplified", counts.faces_simplified},
+                      {"area", counts.area}};
     report["scene"] = {{"format", scene_.format},
                        {"photographs", scene_.views.size()},
                        {"sparse_points", scene_.points.size()},

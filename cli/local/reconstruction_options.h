@@ -93,6 +93,8 @@ void VisitOptions(Options& options, Visitor&& visit) {
   visit(group, "min-component", options.join.min_component_faces, "pieces with fewer faces are left out");
   visit(group, "max-hole", options.join.max_hole_steps, "flat holes up to this wide are closed, lattice steps");
   visit(group, "blend", options.join.blend_steps, "colours run into each other this far from seams, lattice steps");
+  visit(group, "simplify", options.join.simplify_footprints,
+        "leave out triangles (and the colours at their corners) up to this error, pixel footprints g, 0..100; 0: none");
 }
 
 // One line of the table, for pages and for programs that offer the options to their users.

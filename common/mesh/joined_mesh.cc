@@ -14,7 +14,7 @@
 #include "common/base/status_macros.h"
 #include "common/mesh/border_stitching.h"
 #include "common/mesh/disjoint_sets.h"
-#include "common/mesh/part_mesh.h"
+#include "common/mesh/finished_part.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/seam_blending.h"
 
@@ -165,49 +165,28 @@ void AppendVertex(const TriangleMesh& from, size_t vertex, TriangleMesh& to) {
   to.cameras.push_back(from.cameras[vertex]);
 }
 
-// One part, ready to be written.
-struct FinishedPart {
-  TriangleMesh mesh;
-  std::vector<int32_t> index;  // of each vertex of the PartMesh in the mesh; -1: left out
-};
-
-// The part without the components that `small` marks.
-FinishedPart FinishPart(const SparseSurface& surface, const PartBorders::Part& part, const uint8_t* small,
-                        const std::vector<SeamOffset>& offsets, int blend_steps) {
-  const PartMesh part_mesh = BuildPartMesh(surface, std::vector<uint8_t>(part.trimmed.begin(), part.trimmed.end()));
-  std::vector<std::array<uint8_t, 3>> colors = surface.rgb;
-  BlendSeams(offsets, blend_steps, surface, colors);
-  FinishedPart finished;
-  TriangleMesh& mesh = finished.mesh;
-  finished.index.assign(part_mesh.patch_of_vertex.size(), -1);
-  for (size_t v = 0; v < finished.index.size(); ++v) {
-    if (small[part_mesh.component_of_vertex[v]] != 0) continue;
-    finished.index[v] = static_cast<int32_t>(mesh.positions.size());
-    const auto patch = static_cast<size_t>(part_mesh.patch_of_vertex[v]);
-    mesh.positions.emplace_back(surface.Point(patch).cast<float>());
-    mesh.normals.push_back(surface.normal_in_world[patch]);
-    mesh.colors.push_back(colors[patch]);
-    mesh.quality.push_back(surface.quality[patch]);
-  }
-  mesh.cameras.assign(mesh.positions.size(), surface.camera_index);
-  for (const auto& face : part_mesh.faces) {
-    if (finished.index[static_cast<size_t>(face[0])] < 0) continue;
-    std::array<uint32_t, 3> corners = {};
-    for (size_t k = 0; k < 3; ++k) {
-      corners[k] = static_cast<uint32_t>(finished.index[static_cast<size_t>(face[k])]);
-    }
-    mesh.faces.push_back(corners);
-  }
-  return finished;
-}
-
 // Everything about the joins that the writing of parts needs.
 struct Joins {
   std::vector<BorderStitcher::Face> faces;  // border vertices, and copies of them numbered behind
   std::vector<int32_t> copies;              // the border vertex that each is a copy of
   std::vector<std::optional<SeamOffset>> offsets;
   std::vector<uint8_t> small;  // per component: to be left out
+  // (from, to) of the faces between vertices that are no copies, ascending.
+  std::vector<std::pair<int32_t, int32_t>> edges;
 };
+
+std::vector<std::pair<int32_t, int32_t>> SortedEdges(const std::vector<BorderStitcher::Face>& faces, int32_t vertices) {
+  std::vector<std::pair<int32_t, int32_t>> edges;
+  for (const auto& face : faces) {
+    for (size_t k = 0; k < 3; ++k) {
+      const int32_t from = face[k];
+      const int32_t to = face[(k + 1) % 3];
+      if (from < vertices && to < vertices) edges.emplace_back(from, to);
+    }
+  }
+  std::ranges::sort(edges);
+  return edges;
+}
 
 Joins JoinBorders(PartBorders& borders, const JoinOptions& options, JoinedMeshCounts& counts) {
   Joins joins;
@@ -232,8 +211,33 @@ Joins JoinBorders(PartBorders& borders, const JoinOptions& options, JoinedMeshCo
     ++(is_stitch[f] != 0 ? counts.stitch_faces : counts.hole_faces);
   }
   std::erase_if(joins.faces, [&](const BorderStitcher::Face& face) { return drop[static_cast<size_t>(face[0])] != 0; });
+  const auto position = [&](int32_t v) { return stitcher.vertices()[static_cast<size_t>(v)].position; };
+  for (const auto& face : joins.faces) {
+    counts.area += TriangleArea(position(face[0]), position(face[1]), position(face[2]));
+  }
   joins.copies = SplitPoints(stitcher, joins.faces);
+  if (options.simplify_footprints > 0) {
+    joins.edges = SortedEdges(joins.faces, static_cast<int32_t>(stitcher.vertices().size()));
+  }
   return joins;
+}
+
+// What of the joins concerns one part.
+PartJoins JoinsOfPart(const PartBorders& borders, const Joins& joins, size_t index) {
+  const PartBorders::Part& part = borders.parts[index];
+  const int32_t end = borders.parts[index + 1].first_border;
+  PartJoins of_part = {.small = joins.small.data() + part.first_component};
+  for (int32_t v = part.first_border; v < end; ++v) {
+    const std::optional<SeamOffset>& offset = joins.offsets[static_cast<size_t>(v)];
+    if (offset.has_value()) of_part.offsets.push_back(*offset);
+  }
+  const auto vertex = [&](int32_t v) { return static_cast<uint32_t>(borders.origins[static_cast<size_t>(v)].vertex); };
+  auto edge = std::ranges::lower_bound(joins.edges, std::pair(part.first_border, int32_t{0}));
+  for (; edge != joins.edges.end() && edge->first < end; ++edge) {
+    if (edge->second < part.first_border || edge->second >= end) continue;
+    of_part.edges.emplace_back(vertex(edge->first), vertex(edge->second));
+  }
+  return of_part;
 }
 
 // Writes parts one behind the other and remembers where their borders' vertices are.
@@ -303,6 +307,10 @@ absl::Status JoinOptions::Validate() const {
   if (blend_steps < 0 || blend_steps > 1000) {
     return absl::InvalidArgumentError(absl::StrCat("blend_steps is ", blend_steps, ", expected 0 to 1000"));
   }
+  if (!(simplify_footprints >= 0 && simplify_footprints <= 100)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("simplify_footprints is ", simplify_footprints, " pixel footprints, expected 0 to 100"));
+  }
   return absl::OkStatus();
 }
 
@@ -326,20 +334,18 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
   for (const auto& [first, last] : BatchesOfParts(patches)) {
     std::vector<FinishedPart> parts(static_cast<size_t>(last - first));
     MW_RETURN_IF_ERROR(ForEachPart(first, last, pool, [&, first = first](int64_t i) -> absl::Status {
-      const PartBorders::Part& part = borders.parts[static_cast<size_t>(i)];
-      const auto end = borders.parts[static_cast<size_t>(i) + 1].first_border;
-      std::vector<SeamOffset> offsets;
-      for (int32_t v = part.first_border; v < end; ++v) {
-        const std::optional<SeamOffset>& offset = joins.offsets[static_cast<size_t>(v)];
-        if (offset.has_value()) offsets.push_back(*offset);
-      }
+      const auto index = static_cast<size_t>(i);
       MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load(i));
       parts[static_cast<size_t>(i - first)] =
-          FinishPart(*surface, part, joins.small.data() + part.first_component, offsets, options.blend_steps);
+          FinishPart(*surface, borders.parts[index], JoinsOfPart(borders, joins, index), options.blend_steps,
+                     options.simplify_footprints);
       return absl::OkStatus();
     }));
     for (int64_t i = first; i < last; ++i) {
-      MW_RETURN_IF_ERROR(part_writer.Append(i, std::exchange(parts[static_cast<size_t>(i - first)], {})));
+      const FinishedPart part = std::exchange(parts[static_cast<size_t>(i - first)], {});
+      counts.faces_simplified += part.faces_simplified;
+      counts.area += part.area;
+      MW_RETURN_IF_ERROR(part_writer.Append(i, part));
       part_done();
     }
   }

@@ -19,6 +19,9 @@ struct JoinOptions {
   double max_hole_steps = 30;
   // How far from a seam the parts' colours run into each other. Lattice steps, 0 .. 1000.
   int blend_steps = 16;
+  // Within each part triangles become fewer up to this error (SimplifyFaces). Pixel footprints g = z / f, the median of
+  // the part's vertices, 0 .. 100; 0: none are left out.
+  double simplify_footprints = 0;
 
   absl::Status Validate() const;
 };
@@ -33,13 +36,15 @@ struct JoinedMeshCounts {
   int64_t holes_filled = 0;
   int64_t hole_faces = 0;
   int64_t components_removed = 0;
+  int64_t faces_simplified = 0;  // how many fewer there are because of simplify_footprints
+  double area = 0;               // of all faces, scene units squared
 };
 
 // Joins the accepted surfaces 0 .. count - 1 (M_r of section 3.7, Jancosek et al. 2009, which leaves them side by side)
 // into one mesh and writes it as PLY. Where surfaces overlap, the earlier one stays. Borders that come close are
-// stitched, holes filled, small pieces left out, colours run into each other at the seams; positions stay. Every edge
-// has one or two triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their
-// order alone, not on the threads.
+// stitched, holes filled, small pieces left out, colours run into each other at the seams; positions stay. Parts are
+// simplified one by one if wanted, all but their borders. Every edge has one or two triangles, and two run along it in
+// opposite directions. The bytes depend on the surfaces and their order alone, not on the threads.
 //
 // Loads each surface a few times, a few of them at a time, and keeps the vertices on borders of all of them (some 300
 // bytes each, and 1/4 byte for each patch). `part_done` is called twice per surface, one call at a time. Errors: those

@@ -1,5 +1,6 @@
 #include "common/mesh/joined_mesh.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -19,6 +20,7 @@
 #include "common/mesh/disjoint_sets.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/surface_mesh.h"
+#include "common/raycast/mesh_ray_caster.h"
 #include "common/surface/random_surface_testing.h"
 
 namespace meshwright {
@@ -71,6 +73,32 @@ PatchLattice PlaneSeenBy(CameraIndex index, const Camera& camera, const Keep& ke
   return surface;
 }
 
+// The same rays, cut with waves around the plane, z = 0.04 sin(9 x) cos(7 y), instead.
+PatchLattice BentToWaves(PatchLattice surface) {
+  const Eigen::Vector3d center = surface.camera.center_in_world();
+  for (int64_t node = 0; node < surface.lattice.nodes(); ++node) {
+    if (!surface.HasPatch(node)) continue;
+    const auto column = static_cast<int>(node % surface.lattice.columns);
+    const auto row = static_cast<int>(node / surface.lattice.columns);
+    float& depth = surface.depth[static_cast<size_t>(node)];
+    for (int round = 0; round < 30; ++round) {
+      const Eigen::Vector3d x = surface.Point(column, row);
+      const double z = 0.04 * std::sin(9 * x.x()) * std::cos(7 * x.y());
+      depth = static_cast<float>(depth * (z - center.z()) / (x.z() - center.z()));
+    }
+  }
+  return surface;
+}
+
+double AreaOf(const TriangleMesh& mesh) {
+  double area = 0;
+  for (const auto& face : mesh.faces) {
+    const Eigen::Vector3f& a = mesh.positions[face[0]];
+    area += 0.5 * static_cast<double>((mesh.positions[face[1]] - a).cross(mesh.positions[face[2]] - a).norm());
+  }
+  return area;
+}
+
 std::shared_ptr<const SparseSurface> Sparse(const PatchLattice& surface) {
   return std::make_shared<const SparseSurface>(SparseSurface::From(surface));
 }
@@ -95,6 +123,20 @@ std::map<uint32_t, uint32_t> BorderOf(const TriangleMesh& mesh) {
     EXPECT_TRUE(border.emplace(from, to).second) << "two fans meet in a point";
   }
   return border;
+}
+
+// Ends of edges with one triangle, by position and colour, as vertices are numbered anew when some are left out.
+std::multiset<std::vector<float>> RimOf(const TriangleMesh& mesh) {
+  std::multiset<std::vector<float>> rim;
+  for (const auto& [from, to] : BorderOf(mesh)) {
+    std::vector<float> edge;
+    for (const uint32_t v : {from, to}) {
+      edge.insert(edge.end(), mesh.positions[v].begin(), mesh.positions[v].end());
+      edge.insert(edge.end(), mesh.colors[v].begin(), mesh.colors[v].end());
+    }
+    rim.insert(edge);
+  }
+  return rim;
 }
 
 int CountLoops(std::map<uint32_t, uint32_t> border) {
@@ -157,6 +199,7 @@ class JoinedMeshTest : public testing::Test {
     EXPECT_EQ(counts_.border_edges_after, static_cast<int64_t>(border.size()));
     EXPECT_EQ(counts_.vertices, static_cast<int64_t>(mesh.positions.size()));
     EXPECT_EQ(counts_.faces, static_cast<int64_t>(mesh.faces.size()));
+    EXPECT_NEAR(counts_.area, AreaOf(mesh), 1e-4 * AreaOf(mesh));
     return mesh;
   }
   std::string Path() const { return (folder_ / "mesh.ply").string(); }
@@ -317,13 +360,60 @@ TEST_F(JoinedMeshTest, ColorsRunIntoEachOtherAtTheSeam) {
   }
 }
 
+TEST_F(JoinedMeshTest, SimplifiedPartsFitTheSameSeamsAndStayNear) {
+  const std::vector<PatchLattice> surfaces = {
+      BentToWaves(PlaneSeenBy(0, left_, Everywhere)),
+      BentToWaves(PlaneSeenBy(1, right_, [](double x, double y) { return std::hypot(x - 0.5, y) > 0.1; }))};
+  const TriangleMesh full = Join(surfaces, {});
+  const JoinedMeshCounts full_counts = counts_;
+  EXPECT_EQ(full_counts.faces_simplified, 0);
+  int64_t fewer = full_counts.faces;
+  for (const double g : {0.02, 0.1, 0.5}) {
+    const TriangleMesh mesh = Join(surfaces, {.simplify_footprints = g});
+    EXPECT_EQ(counts_.faces + counts_.faces_simplified, full_counts.faces);
+    EXPECT_EQ(counts_.stitch_faces, full_counts.stitch_faces);
+    EXPECT_EQ(counts_.hole_faces, full_counts.hole_faces);
+    EXPECT_LT(counts_.faces, fewer);
+    fewer = counts_.faces;
+    EXPECT_EQ(RimOf(mesh), RimOf(full));
+    EXPECT_NEAR(counts_.area, full_counts.area, 0.02 * full_counts.area);
+    const MeshRayCaster caster(mesh);
+    const double footprint = 1.2 / 80;  // of the farther camera
+    double farthest = 0;
+    for (const Eigen::Vector3f& x : full.positions) {
+      const NearestSurfacePoint nearest = caster.Nearest(x.cast<double>(), 1);
+      ASSERT_TRUE(nearest.ok());
+      farthest = std::max(farthest, nearest.distance);
+    }
+    EXPECT_LT(farthest, 3 * g * footprint);
+  }
+  EXPECT_LT(fewer, full_counts.faces / 2);
+}
+
+TEST_F(JoinedMeshTest, HoweverMuchIsLeftOutEdgesAreManifold) {
+  for (uint32_t seed = 0; seed < 12; ++seed) {
+    std::vector<PatchLattice> surfaces;
+    for (uint32_t i = 0; i < 3; ++i) {
+      surfaces.push_back(RandomSurface(3 * seed + i, SmallCamera(37, 29), 1, 0.6 + 0.03 * seed, 0.97));
+      for (float& depth : surfaces.back().depth) depth = depth > 0 ? 2 + 0.1F * depth : 0;
+      for (auto& normal : surfaces.back().normal_in_world) normal = {0, 0, -1};
+    }
+    const auto rim = RimOf(Join(surfaces, {.min_component_faces = 0}));
+    EXPECT_EQ(RimOf(Join(surfaces, {.min_component_faces = 0, .simplify_footprints = 100})), rim);
+    EXPECT_GT(counts_.faces_simplified, 0);
+  }
+}
+
 TEST_F(JoinedMeshTest, SameBytesForAnyNumberOfThreads) {
   const std::vector<PatchLattice> surfaces = {PlaneSeenBy(0, left_, Everywhere), PlaneSeenBy(1, right_, Everywhere),
                                               RandomSurface(2, SmallCamera(60, 50), 1, 0.9, 0.9)};
-  Join(surfaces, {.min_component_faces = 0}, 1);
-  const std::string bytes = *ReadFile(Path());
-  Join(surfaces, {.min_component_faces = 0}, 4);
-  EXPECT_EQ(bytes, *ReadFile(Path()));
+  for (const double simplify : {0.0, 0.5}) {
+    const JoinOptions options = {.min_component_faces = 0, .simplify_footprints = simplify};
+    Join(surfaces, options, 1);
+    const std::string bytes = *ReadFile(Path());
+    Join(surfaces, options, 4);
+    EXPECT_EQ(bytes, *ReadFile(Path()));
+  }
 }
 
 TEST_F(JoinedMeshTest, NothingAcceptedIsAnEmptyMesh) {
@@ -345,6 +435,10 @@ TEST(JoinOptionsTest, RefusesValuesOutOfRange) {
   EXPECT_THAT(JoinOptions{.min_component_faces = -1}.Validate().ToString(), testing::HasSubstr("min_component_faces"));
   EXPECT_THAT(JoinOptions{.max_hole_steps = NAN}.Validate().ToString(), testing::HasSubstr("max_hole_steps"));
   EXPECT_THAT(JoinOptions{.blend_steps = -1}.Validate().ToString(), testing::HasSubstr("blend_steps"));
+  for (const double g : {-0.1, 100.1, static_cast<double>(NAN)}) {
+    EXPECT_THAT(JoinOptions{.simplify_footprints = g}.Validate().ToString(), testing::HasSubstr("simplify_footprints"));
+  }
+  EXPECT_TRUE(JoinOptions{.simplify_footprints = 100}.Validate().ok());
 }
 
 }  // namespace
