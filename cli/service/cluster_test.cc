@@ -209,6 +209,47 @@ TEST_F(ClusterTest, PostgresHoldsTheStateAsWell) {
   coordinator_.reset();  // before its schema goes
 }
 
+// Two coordinators on one PostgreSQL and one folder of blobs, a worker at each. In the middle the one that conducts loses
+// its lease to somebody who is never heard of; whoever of the two looks first goes on when that has run out.
+TEST_F(ClusterTest, CoordinatorsShareAReconstructionAndTakeItOver) {
+  const absl::StatusOr<std::string> server = SharedTestPostgres();
+  if (!server.ok()) GTEST_SKIP() << server.status().message();
+  const PostgresSchema schema(*server);
+  store_ = schema.url();
+  blobs_ = folder_ + "/shared_blobs";
+  coordinator_.reset();
+  StartCoordinator();
+  const auto second = CoordinatorProgram::Start({.listen = "127.0.0.1:0",
+                                                 .data_folder = folder_ + "/second",
+                                                 .store = store_,
+                                                 .blobs = blobs_,
+                                                 .scene_roots = {SharedScene()},
+                                                 .lease_seconds = 3});
+  ASSERT_TRUE(second.ok()) << second.status();
+  CreateAndStart(ByReference("facade"));
+  StartWorker("first", false);
+  address_ = absl::StrCat("127.0.0.1:", (*second)->port());
+  StartWorker("second", true);
+  const std::unique_ptr<ServiceClient> other = ServiceClient::Connect(address_);
+  while (other->Get("facade")->progress().cameras_committed() < 2) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  const std::string owner =
+      RunSql(schema.url(), "SELECT owner FROM conductor_leases WHERE reconstruction_id = 'facade'");
+  EXPECT_THAT(owner, HasSubstr(folder_));
+  RunSql(schema.url(), "UPDATE conductor_leases SET owner = 'nobody', epoch = epoch + 1");
+  client_ = ServiceClient::Connect(address_);
+  const v1::Reconstruction done = WaitFor("facade");
+  EXPECT_EQ(done.state(), v1::RECONSTRUCTION_STATE_DONE) << done.failure();
+  EXPECT_TRUE(FetchMesh("facade") == LocalMesh());
+  // The mesh is everywhere.
+  client_ = ServiceClient::Connect(absl::StrCat("127.0.0.1:", coordinator_->port()));
+  EXPECT_TRUE(FetchMesh("facade") == LocalMesh());
+  EXPECT_EQ(client_->ListWorkers()->workers_size(), 2);
+  StopWorkers();
+  coordinator_.reset();
+}
+
 TEST_F(ClusterTest, S3HoldsTheBlobsAsWell) {
   const auto server = S3Server::Start();
   if (!server.ok()) GTEST_SKIP() << server.status().message();

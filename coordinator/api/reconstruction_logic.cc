@@ -216,10 +216,14 @@ absl::StatusOr<v1::Reconstruction> ReconstructionLogic::Create(const v1::CreateR
                                  .state = ReconstructionState::kCreated,
                                  .weight = std::round(weight / kMinWeight) * kMinWeight,
                                  .scene_reference = request.scene_reference()};
-  MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
-  const absl::Status created = environment_.store->CreateReconstruction(wanted, now);
-  if (!created.ok() && !absl::IsAlreadyExists(created)) return created;
-  const absl::StatusOr<Reconstruction> stored = Find(wanted.id);
+  absl::StatusOr<Reconstruction> stored = Find(wanted.id);
+  if (absl::IsNotFound(stored.status())) {
+    MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
+    const absl::Status created = environment_.store->CreateReconstruction(wanted, now);
+    // Another call, or another coordinator, may have been quicker.
+    if (!created.ok() && !absl::IsAlreadyExists(created)) return created;
+    stored = Find(wanted.id);
+  }
   if (absl::IsNotFound(stored.status())) {
     return absl::AlreadyExistsError(
         absl::StrCat("id \"", wanted.id, "\" is that of a reconstruction that was deleted"));

@@ -21,10 +21,12 @@ constexpr char kEnded[] = "meshwright_leases_ended_total";
 constexpr char kEndedHelp[] = "Leases of camera jobs by how they ended; lost: the worker was silent for too long.";
 constexpr CountedStatement kCountedStatements[] = {
     {"create_reconstruction", nullptr, nullptr, nullptr, "reconstruction created", false},
-    {"set_reconstruction_state", nullptr, nullptr, nullptr, "reconstruction ended", false},
+    {"set_reconstruction_state", nullptr, nullptr, nullptr, "reconstruction state", false},
+    {"finish_reconstruction", nullptr, nullptr, nullptr, "reconstruction done", false},
+    {"reopen_camera_job", nullptr, nullptr, nullptr, "result taken back", true},
     {"delete_reconstruction", nullptr, nullptr, nullptr, "reconstruction deleted", false},
-    {"claim_camera_job", "meshwright_leases_granted_total", "Camera jobs handed out to workers.", nullptr,
-     "jobs leased", false},
+    {"claim_camera_job", "meshwright_leases_granted_total", "Camera jobs handed out to workers.", nullptr, "job leased",
+     false},
     {"renew_lease", "meshwright_leases_renewed_total", "Leases prolonged because their worker was heard of.", nullptr,
      nullptr, false},
     {"complete_camera_job", kEnded, kEndedHelp, "finished", "job finished", false},

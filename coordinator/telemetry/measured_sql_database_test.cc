@@ -44,6 +44,7 @@ class MeasuredStoreTest : public testing::Test {
                     .ok());
   }
   void TearDown() override {
+    workers_.reset();
     store_.reset();
     std::filesystem::remove_all(folder_);
   }
@@ -123,15 +124,13 @@ TEST_F(MeasuredStoreTest, CommitsBringAcceptedRaysAlsoInTransactions) {
 
 TEST_F(MeasuredStoreTest, WhatHappensIsLoggedOnceAndWithNames) {
   Assign(1);
-  const CameraLease lease = Lease();
-  for (int repetition = 0; repetition < 2; ++repetition) {
-    ASSERT_TRUE(store_->FailLease("r", 1, lease.job.epoch, "w", {.reason = "no light"}, clock_.Now()).ok());
-  }
+  const int64_t epoch = Change(JobChange::Kind::kClaim, 1);
+  for (int repetition = 0; repetition < 2; ++repetition) Change(JobChange::Kind::kFail, epoch);
   EXPECT_THAT(lines_, testing::ElementsAre(
                           testing::EndsWith("info    reconstruction created  reconstruction=r  state=running"),
-                          testing::EndsWith("info    jobs leased  worker=w"),
+                          testing::EndsWith("info    job leased  reconstruction=r  sequence=1  attempt=1  worker=w"),
                           testing::EndsWith("warning job failed  reconstruction=r  sequence=1  attempt=2  worker=w  "
-                                            "error=\"no light\"")));
+                                            "error=x")));
 }
 
 TEST_F(MeasuredStoreTest, GaugesFollowTheStore) {
