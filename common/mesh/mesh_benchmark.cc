@@ -18,7 +18,8 @@ std::string BenchmarkPath() {
   return (std::filesystem::temp_directory_path() / "meshwright_mesh_benchmark.ply").string();
 }
 
-// Four surfaces of 0.4 M patches each, of the same plane seen from places apart.
+// Four surfaces of 0.4 M patches each, of the same plane seen from places apart. The argument: simplified to so many
+// pixel footprints.
 void BM_WriteJoinedMesh(benchmark::State& state) {
   std::vector<std::shared_ptr<const SparseSurface>> surfaces;
   for (int i = 0; i < 4; ++i) {
@@ -29,18 +30,19 @@ void BM_WriteJoinedMesh(benchmark::State& state) {
     for (auto& normal : surface.normal_in_world) normal = -camera.viewing_direction_in_world().cast<float>();
     surfaces.push_back(std::make_shared<const SparseSurface>(SparseSurface::From(surface)));
   }
+  const JoinOptions options = {.simplify_footprints = static_cast<double>(state.range(0))};
   ThreadPool pool(1);
-  int64_t vertices = 0;
+  int64_t faces = 0;
   for (auto _ : state) {
     const auto counts = WriteJoinedMesh(
-        4, [&](int64_t i) { return surfaces[static_cast<size_t>(i)]; }, {}, BenchmarkPath(), pool);
+        4, [&](int64_t i) { return surfaces[static_cast<size_t>(i)]; }, options, BenchmarkPath(), pool);
     MW_CHECK(counts.ok());
-    vertices += counts->vertices;
+    faces += counts->faces + counts->faces_simplified;
   }
-  state.SetItemsProcessed(vertices);
+  state.SetItemsProcessed(faces);
   std::filesystem::remove(BenchmarkPath());
 }
-BENCHMARK(BM_WriteJoinedMesh)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_WriteJoinedMesh)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 void BM_ReadPly(benchmark::State& state) {
   MW_CHECK(WriteSurfacePart(RandomSurface(1, SmallCamera(1536, 1024), 1, 0.97, 0.98), BenchmarkPath()).ok());
