@@ -90,6 +90,17 @@ PatchLattice BentToWaves(PatchLattice surface) {
   return surface;
 }
 
+// Three ragged surfaces on top of each other.
+std::vector<PatchLattice> RandomParts(uint32_t seed, double density, double link_density) {
+  std::vector<PatchLattice> surfaces;
+  for (uint32_t i = 0; i < 3; ++i) {
+    surfaces.push_back(RandomSurface(3 * seed + i, SmallCamera(37, 29), 1, density, link_density));
+    for (float& depth : surfaces.back().depth) depth = depth > 0 ? 2 + 0.1F * depth : 0;
+    for (auto& normal : surfaces.back().normal_in_world) normal = {0, 0, -1};
+  }
+  return surfaces;
+}
+
 double AreaOf(const TriangleMesh& mesh) {
   double area = 0;
   for (const auto& face : mesh.faces) {
@@ -223,13 +234,7 @@ TEST_F(JoinedMeshTest, OneSurfaceIsItsTriangles) {
 
 TEST_F(JoinedMeshTest, WhateverTheSurfacesEdgesAreManifold) {
   for (uint32_t seed = 0; seed < 12; ++seed) {
-    std::vector<PatchLattice> surfaces;
-    for (uint32_t i = 0; i < 3; ++i) {
-      surfaces.push_back(RandomSurface(3 * seed + i, SmallCamera(37, 29), 1, 0.5 + 0.04 * seed, 0.9));
-      for (float& depth : surfaces.back().depth) depth = depth > 0 ? 2 + 0.1F * depth : 0;
-      for (auto& normal : surfaces.back().normal_in_world) normal = {0, 0, -1};
-    }
-    Join(surfaces, {.min_component_faces = static_cast<int64_t>(seed % 3) * 5});
+    Join(RandomParts(seed, 0.5 + 0.04 * seed, 0.9), {.min_component_faces = static_cast<int64_t>(seed % 3) * 5});
     EXPECT_GT(counts_.stitch_faces, 0);
   }
 }
@@ -392,12 +397,7 @@ TEST_F(JoinedMeshTest, SimplifiedPartsFitTheSameSeamsAndStayNear) {
 
 TEST_F(JoinedMeshTest, HoweverMuchIsLeftOutEdgesAreManifold) {
   for (uint32_t seed = 0; seed < 12; ++seed) {
-    std::vector<PatchLattice> surfaces;
-    for (uint32_t i = 0; i < 3; ++i) {
-      surfaces.push_back(RandomSurface(3 * seed + i, SmallCamera(37, 29), 1, 0.6 + 0.03 * seed, 0.97));
-      for (float& depth : surfaces.back().depth) depth = depth > 0 ? 2 + 0.1F * depth : 0;
-      for (auto& normal : surfaces.back().normal_in_world) normal = {0, 0, -1};
-    }
+    const std::vector<PatchLattice> surfaces = RandomParts(seed, 0.6 + 0.03 * seed, 0.97);
     const auto rim = RimOf(Join(surfaces, {.min_component_faces = 0}));
     EXPECT_EQ(RimOf(Join(surfaces, {.min_component_faces = 0, .simplify_footprints = 100})), rim);
     EXPECT_GT(counts_.faces_simplified, 0);
