@@ -204,8 +204,8 @@ absl::StatusOr<v1::Reconstruction> ReconstructionLogic::Create(const v1::CreateR
   MW_RETURN_IF_ERROR(ValidateReconstructionId(request.id()));
   const double weight = request.weight() == 0 ? 1 : request.weight();
   if (!(weight >= kMinWeight && weight <= kMaxWeight)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("weight is ", request.weight(), ", expected ", kMinWeight, "..", kMaxWeight, ", or 0 for 1"));
+    return absl::InvalidArgumentError(absl::StrCat("weight is ", request.weight(), ", expected 0..", kMaxWeight,
+                                                   "; 0 stands for 1, other weights are at least ", kMinWeight));
   }
   MW_ASSIGN_OR_RETURN(const Method method, environment_.parse_method(request.options_json()));
   if (!request.scene_reference().empty()) {
