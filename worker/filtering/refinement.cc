@@ -22,7 +22,7 @@ constexpr float kMaxUncertainty = 4;
 constexpr float kUnrefinedUncertainty = 1;
 // A depth that is less certain is dropped, pixel footprints: where there is next to no texture photo-consistency agrees
 // with itself at any depth, and neighbouring views of a dark background confirm each other's inventions.
-constexpr float kMaxKeptUncertainty = 1;
+constexpr float kMaxKeptUncertainty = 2;
 
 // The targets that may vote, and their mean score.
 struct Voters {
