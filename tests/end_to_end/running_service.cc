@@ -1,5 +1,6 @@
 #include "tests/end_to_end/running_service.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include <gtest/gtest.h>
@@ -14,9 +15,9 @@ std::vector<std::string> With(std::vector<std::string> arguments, const std::vec
 std::unique_ptr<BackgroundProgram> RunningService::StartCoordinator(const std::vector<std::string>& arguments) {
   const std::string log = folder_ / ("coordinator-" + port_ + ".log");
   std::remove(log.c_str());
-  auto coordinator = std::make_unique<BackgroundProgram>(
-      MESHWRIGHT_COORDINATOR,
-      With({"--data", folder_ / "data", "--listen", "127.0.0.1:" + port_, "--lease-seconds", "2"}, arguments), log);
+  std::vector<std::string> all = With({"--listen", "127.0.0.1:" + port_, "--lease-seconds", "2"}, arguments);
+  if (std::find(all.begin(), all.end(), "--data") == all.end()) all = With(all, {"--data", folder_ / "data"});
+  auto coordinator = std::make_unique<BackgroundProgram>(MESHWRIGHT_COORDINATOR, all, log);
   port_ = ListeningPort(log);
   return coordinator;
 }

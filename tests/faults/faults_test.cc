@@ -187,15 +187,30 @@ TEST_F(FaultsTest, SurfacesRotOnTheDisk) {
   EXPECT_TRUE(service_.WaitForMesh("turn") == Expected());
 }
 
-TEST_F(FaultsTest, APhotographRotsOnTheDisk) {
-  const auto coordinator = service_.StartCoordinator();
+TEST_F(FaultsTest, PhotographsRotOnTheDiskThoughTheSceneIsStillThere) {
+  const fs::path folder = scene();
+  const auto coordinator = service_.StartCoordinator({"--scene-root", folder.parent_path().string()});
   auto worker = service_.StartWorker("worker");
-  Submit();
+  const auto submitted = service_.Client(With({"submit", "file:turn", "--id", "turn"}, kOptions));
+  ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
   ASSERT_TRUE(Reaches(2));
   worker->Stop(SIGKILL);  // with the photographs that it had read
   EXPECT_EQ(FlipBytes(service_.folder() / "data/blobs", "\x89PNG"), 24);
   worker = service_.StartWorker("worker");
   EXPECT_TRUE(service_.WaitForMesh("turn") == Expected());
+}
+
+TEST_F(FaultsTest, UploadedPhotographsThatRotAreNamed) {
+  const auto coordinator = service_.StartCoordinator();
+  auto worker = service_.StartWorker("worker");
+  Submit();
+  ASSERT_TRUE(Reaches(2));
+  worker->Stop(SIGKILL);
+  EXPECT_EQ(FlipBytes(service_.folder() / "data/blobs", "\x89PNG"), 24);
+  worker = service_.StartWorker("worker");
+  EXPECT_EQ(service_.Client({"watch", "turn"}).exit_code, 1);
+  EXPECT_THAT(service_.Status("turn")["failure"].get<std::string>(),
+              testing::ContainsRegex("[0-9]+\\.png is damaged or lost"));
 }
 
 // A file system of a few megabytes.
