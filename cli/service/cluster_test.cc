@@ -209,8 +209,8 @@ TEST_F(ClusterTest, PostgresHoldsTheStateAsWell) {
   coordinator_.reset();  // before its schema goes
 }
 
-// Two coordinators on one PostgreSQL and one folder of blobs, a worker at each. In the middle the one that conducts loses
-// its lease to somebody who is never heard of; whoever of the two looks first goes on when that has run out.
+// Two coordinators on one PostgreSQL and one folder of blobs, a worker at each. In the middle the one that conducts
+// loses its lease to somebody who is never heard of; whoever of the two looks first goes on when that has run out.
 TEST_F(ClusterTest, CoordinatorsShareAReconstructionAndTakeItOver) {
   const absl::StatusOr<std::string> server = SharedTestPostgres();
   if (!server.ok()) GTEST_SKIP() << server.status().message();

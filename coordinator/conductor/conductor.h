@@ -137,7 +137,7 @@ class Conductor {
   void Assign(const Assignment& assignment);
   absl::Status Flush();
   absl::StatusOr<std::shared_ptr<const SparseSurface>> LoadSurface(const std::string& digest,
-                                                                  CameraIndex expected_camera);
+                                                                   CameraIndex expected_camera);
   absl::Status Reject(SequenceNumber sequence, int64_t epoch, const std::string& reason, int max_failures);
   absl::StatusOr<const Assignment*> FindInFlight(SequenceNumber sequence) const;
   absl::Status CommitWhatIsNext();
