@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <set>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -37,6 +38,13 @@ v1::CameraState CameraStateOf(CameraJobState state, bool committed) {
   if (state == CameraJobState::kSetAside) return v1::CAMERA_STATE_SET_ASIDE;
   if (committed) return v1::CAMERA_STATE_COMMITTED;
   return state == CameraJobState::kDone ? v1::CAMERA_STATE_DONE : v1::CAMERA_STATE_ASSIGNED;
+}
+
+void FillPart(const Commit& commit, v1::Part& part) {
+  part.set_sequence(commit.sequence);
+  part.set_camera(commit.camera);
+  part.set_sha256(commit.accepted_digest);
+  part.set_patches(commit.accepted_patches);
 }
 
 }  // namespace
@@ -391,31 +399,45 @@ absl::StatusOr<v1::ListAttemptsResponse> ReconstructionLogic::ListAttempts(
   }
   const int limit = request.max_attempts() > 0 ? request.max_attempts() : kDefaultAttempts;
   MW_RETURN_IF_ERROR(Find(request.id()).status());
+  MW_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, environment_.store->ListAttempts(request.id(), limit));
+  // What runs is known as of the last turn; it may have ended since.
+  std::set<std::pair<SequenceNumber, int64_t>> ended;
+  for (const Attempt& attempt : attempts) ended.insert({attempt.sequence, attempt.epoch});
   v1::ListAttemptsResponse response;
   for (v1::Attempt& attempt : environment_.workers->RunningIn(request.id())) {
-    if (response.attempts_size() < limit) *response.add_attempts() = std::move(attempt);
+    if (response.attempts_size() == limit) break;
+    if (ended.count({attempt.sequence(), attempt.epoch()}) == 0) *response.add_attempts() = std::move(attempt);
   }
-  MW_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, environment_.store->ListAttempts(request.id(), limit));
   for (const Attempt& attempt : attempts) {
-    if (response.attempts_size() < limit) *response.add_attempts() = ToProto(request.id(), attempt);
+    if (response.attempts_size() == limit) break;
+    *response.add_attempts() = ToProto(request.id(), attempt);
   }
   return response;
 }
 
-absl::StatusOr<v1::ListPartsResponse> ReconstructionLogic::ListParts(const std::string& id) const {
+absl::StatusOr<v1::ListPartsResponse> ReconstructionLogic::ListParts(const std::string& id,
+                                                                     SequenceNumber after) const {
   MW_RETURN_IF_ERROR(Find(id).status());
+  MW_ASSIGN_OR_RETURN(const std::vector<Commit> commits, environment_.store->ListCommits(id, after));
   v1::ListPartsResponse response;
-  const absl::StatusOr<std::vector<Commit>> commits = environment_.store->ListCommits(id);
-  MW_RETURN_IF_ERROR(commits.status());
-  for (const Commit& commit : *commits) {
-    if (commit.accepted_digest.empty()) continue;
-    v1::Part& part = *response.add_parts();
-    part.set_sequence(commit.sequence);
-    part.set_camera(commit.camera);
-    part.set_sha256(commit.accepted_digest);
-    part.set_patches(commit.accepted_patches);
+  for (const Commit& commit : commits) {
+    if (!commit.accepted_digest.empty()) FillPart(commit, *response.add_parts());
   }
   return response;
+}
+
+absl::StatusOr<v1::Part> ReconstructionLogic::GetPart(const std::string& id, SequenceNumber sequence) const {
+  MW_RETURN_IF_ERROR(Find(id).status());
+  v1::Part part;
+  if (sequence > 0) {
+    MW_ASSIGN_OR_RETURN(const std::vector<Commit> commits, environment_.store->ListCommits(id, sequence - 1, 1));
+    if (!commits.empty() && commits[0].sequence == sequence && !commits[0].accepted_digest.empty()) {
+      FillPart(commits[0], part);
+      return part;
+    }
+  }
+  return absl::NotFoundError(
+      absl::StrCat("sequence is ", sequence, ", expected that of a part of reconstruction ", id));
 }
 
 absl::StatusOr<std::string> ReconstructionLogic::MeshPath(const std::string& id) const {
@@ -427,12 +449,9 @@ absl::StatusOr<std::string> ReconstructionLogic::MeshPath(const std::string& id)
   return path;
 }
 
-absl::StatusOr<std::string> ReconstructionLogic::PartBytes(const std::string& id, int32_t sequence) const {
-  MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts, ListParts(id));
-  for (const v1::Part& part : parts.parts()) {
-    if (part.sequence() == sequence) return environment_.blobs->Get(part.sha256());
-  }
-  return absl::NotFoundError(absl::StrCat("reconstruction ", id, " has no part with sequence ", sequence));
+absl::StatusOr<std::string> ReconstructionLogic::PartBytes(const std::string& id, SequenceNumber sequence) const {
+  MW_ASSIGN_OR_RETURN(const v1::Part part, GetPart(id, sequence));
+  return environment_.blobs->Get(part.sha256());
 }
 
 absl::Status ReconstructionLogic::Watch(const std::string& id,

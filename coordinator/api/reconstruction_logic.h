@@ -54,11 +54,13 @@ class ReconstructionLogic {
   // checked.
   absl::StatusOr<Scene> LoadScene(const std::string& id) const;
   absl::StatusOr<v1::GetIncidenceResponse> GetIncidence(const std::string& id) const;
-  absl::StatusOr<v1::ListPartsResponse> ListParts(const std::string& id) const;
+  // Those with a sequence greater than `after`.
+  absl::StatusOr<v1::ListPartsResponse> ListParts(const std::string& id, SequenceNumber after = 0) const;
+  absl::StatusOr<v1::Part> GetPart(const std::string& id, SequenceNumber sequence) const;
   absl::StatusOr<v1::ListAttemptsResponse> ListAttempts(const v1::ListAttemptsRequest& request) const;
   // The file to be read: this coordinator's copy of the mesh, there as long as the reconstruction is not deleted.
   absl::StatusOr<std::string> MeshPath(const std::string& id) const;
-  absl::StatusOr<std::string> PartBytes(const std::string& id, int32_t sequence) const;
+  absl::StatusOr<std::string> PartBytes(const std::string& id, SequenceNumber sequence) const;
 
   // Calls `send` with what it is and again when it has changed, until it is over, `send` gives false or Shutdown().
   absl::Status Watch(const std::string& id, const std::function<bool(const v1::Reconstruction&)>& send);

@@ -101,6 +101,21 @@ void WorkerLogic::Shutdown() {
   wake_.notify_all();
 }
 
+absl::Status WorkerLogic::Drain(const std::string& worker) {
+  const absl::Status drained = store_.SetWorkerDrained(worker, true);
+  if (absl::IsNotFound(drained)) {
+    return absl::NotFoundError(absl::StrCat("there is no worker \"", worker.substr(0, kMaxIdLength), "\""));
+  }
+  MW_RETURN_IF_ERROR(drained);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    workers_changed_ = true;
+    awake_ = true;
+  }
+  wake_.notify_all();
+  return absl::OkStatus();
+}
+
 void WorkerLogic::Wake() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -311,7 +326,7 @@ std::vector<WorkerRecord> WorkerLogic::Heartbeats(const std::list<Call>& calls, 
                                 .cores = request.cores(),
                                 .memory_bytes = request.memory_bytes(),
                                 .last_heartbeat = now,
-                                .drained = before.drained,
+                                .drained = before.drained && before.instance == request.instance(),
                                 .instance = request.instance(),
                                 .version = request.version(),
                                 .draining = request.draining()};
@@ -324,7 +339,12 @@ std::vector<WorkerRecord> WorkerLogic::Heartbeats(const std::list<Call>& calls, 
 }
 
 absl::Status WorkerLogic::LookAtWorkers(absl::Time now) {
-  if (now - last_look_at_workers_ < std::min(lease_.lease / 4, kLookAtWorkers)) return absl::OkStatus();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const bool is_due = now - last_look_at_workers_ >= std::min(lease_.lease / 4, kLookAtWorkers);
+    if (!is_due && !workers_changed_) return absl::OkStatus();
+    workers_changed_ = false;
+  }
   MW_RETURN_IF_ERROR(store_.RemoveSilentWorkers(now - kLeasesUntilForgotten * lease_.lease));
   MW_ASSIGN_OR_RETURN(const std::vector<WorkerRecord> workers, store_.ListWorkers());
   last_look_at_workers_ = now;

@@ -44,6 +44,10 @@ class WorkerLogic {
   absl::StatusOr<v1::SynchronizeResponse> Synchronize(const v1::SynchronizeRequest& request,
                                                       const std::function<bool()>& cancelled);
 
+  // The worker finishes what it holds and is given nothing more, by any coordinator (others notice within a second),
+  // until its process is another one. Repeating it is harmless. NotFound: no such worker is known.
+  absl::Status Drain(const std::string& worker);
+
   // There may be new jobs in the store.
   void Wake();
   // Called after each turn with each reconstruction that has new results, or blobs that could not be read.
@@ -103,6 +107,7 @@ class WorkerLogic {
   std::vector<int64_t> abandoned_;
   std::function<void(const std::string&)> listener_;
   bool awake_ = false;
+  bool workers_changed_ = false;  // in the store, by other ways than heartbeats from here
   bool stopping_ = false;
   int64_t next_call_ = 1;
   std::vector<OpenJob> seen_;  // as of the last turn

@@ -236,6 +236,28 @@ TEST_F(WorkerLogicTest, WhoGoesAwayWaitsForNothing) {
   EXPECT_TRUE(absl::IsAborted(first.get_future().get()));
 }
 
+TEST_F(WorkerLogicTest, ADrainedWorkerKeepsWhatItHasAndGetsNothingMore) {
+  EXPECT_TRUE(absl::IsNotFound(logic_->Drain("w")));
+  Offer(1);
+  v1::SynchronizeRequest running = Request("w");
+  running.set_cores(2);
+  *running.add_held() = Held(Synchronize(running).jobs(0));
+  ASSERT_TRUE(logic_->Drain("w").ok());
+  ASSERT_TRUE(logic_->Drain("w").ok());
+  Offer(2);
+  EXPECT_EQ(Synchronize(running).jobs_size(), 1);
+  EXPECT_TRUE(logic_->ListWorkers().workers(0).draining());
+  Pass(absl::Seconds(5));  // the other one looks
+  EXPECT_EQ(Synchronize(*other_, running).jobs_size(), 1);
+  EXPECT_EQ(Stored(1).lease_worker, "w");
+  EXPECT_EQ(Stored(2).lease_worker, "");
+  // Its next process is not drained.
+  v1::SynchronizeRequest anew = Request("w");
+  anew.set_instance("2");
+  anew.set_patience_seconds(5);
+  EXPECT_EQ(Synchronize(anew).jobs_size(), 1);
+}
+
 TEST_F(WorkerLogicTest, AJobThatFitsNobodyIsSpokenOf) {
   Offer(1, int64_t{5} << 30);
   Synchronize(Request("w"));

@@ -110,7 +110,7 @@ class ReconstructionShell final : public v1::ReconstructionService::Service {
   }
   grpc::Status ListParts(grpc::ServerContext*, const v1::ListPartsRequest* request,
                          v1::ListPartsResponse* response) override {
-    return Answer(logic_.ListParts(request->id()), [&](const auto& value) { *response = value; });
+    return Answer(logic_.ListParts(request->id(), request->after()), [&](const auto& value) { *response = value; });
   }
   grpc::Status DownloadMesh(grpc::ServerContext*, const v1::DownloadMeshRequest* request,
                             grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {

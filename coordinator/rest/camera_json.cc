@@ -1,6 +1,9 @@
 #include "coordinator/rest/camera_json.h"
 
 #include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <absl/strings/str_cat.h>
@@ -58,12 +61,22 @@ constexpr char kInfo[] = "info";
 constexpr char kWarning[] = "warning";
 constexpr char kError[] = "error";
 constexpr ptrdiff_t kMaxLogEntries = 1000;
+// The last ones that cameras are counted and failures looked for in.
+constexpr int kAttemptsLookedAt = 20'000;
+
+absl::StatusOr<v1::ListAttemptsResponse> LastAttempts(const ReconstructionLogic& logic, const std::string& id) {
+  v1::ListAttemptsRequest request;
+  request.set_id(id);
+  request.set_max_attempts(kAttemptsLookedAt);
+  return logic.ListAttempts(request);
+}
 
 struct LogEntry {
   absl::Time time;
   const char* severity = kInfo;
   std::string message;
   int32_t camera = -1;  // -1: about none
+  std::string worker;   // "": about none
 };
 
 absl::Time TimeOf(const google::protobuf::Timestamp& timestamp) {
@@ -75,7 +88,20 @@ Json EntryJson(const LogEntry& entry) {
                {"severity", entry.severity},
                {"message", entry.message}};
   if (entry.camera >= 0) json["camera"] = entry.camera;
+  if (!entry.worker.empty()) json["worker"] = entry.worker;
   return json;
+}
+
+// What went wrong; nothing for an attempt that did not.
+std::optional<LogEntry> EntryOf(const v1::Attempt& attempt, const std::string& camera_name) {
+  const char* what = nullptr;
+  if (attempt.ending() == v1::ATTEMPT_ENDING_FAILED) what = " failed";
+  if (attempt.ending() == v1::ATTEMPT_ENDING_OUT_OF_MEMORY) what = " ran out of memory";
+  if (attempt.ending() == v1::ATTEMPT_ENDING_LOST) what = " was lost with its worker, and is done again";
+  if (what == nullptr) return std::nullopt;
+  std::string message = camera_name + what;
+  if (!attempt.reason().empty()) message += ": " + attempt.reason();
+  return LogEntry{TimeOf(attempt.end_time()), kWarning, std::move(message), attempt.camera(), attempt.worker()};
 }
 
 }  // namespace
@@ -85,8 +111,17 @@ absl::StatusOr<Json> CamerasJson(const ReconstructionLogic& logic, const std::st
   Json list = Json::array();
   if (cameras.cameras_size() > 0) {
     MW_ASSIGN_OR_RETURN(const Scene scene, logic.LoadScene(id));
+    MW_ASSIGN_OR_RETURN(const v1::ListAttemptsResponse attempts, LastAttempts(logic, id));
+    std::map<int32_t, int> count;
+    std::map<int32_t, std::string> last_worker;
+    for (const v1::Attempt& attempt : attempts.attempts()) {
+      ++count[attempt.camera()];
+      last_worker.try_emplace(attempt.camera(), attempt.worker());  // the last ones come first
+    }
     for (const v1::Camera& camera : cameras.cameras()) {
       Json json = Json::parse(ToJson(camera), nullptr, false);
+      json["attempts"] = count[camera.index()];
+      json["worker"] = last_worker[camera.index()];
       const auto index = static_cast<size_t>(camera.index());
       if (index < scene.views.size()) json["geometry"] = GeometryJson(scene.views[index]);
       AddReport(camera, json);
@@ -101,13 +136,25 @@ absl::StatusOr<Json> CamerasJson(const ReconstructionLogic& logic, const std::st
 absl::StatusOr<Json> LogJson(const ReconstructionLogic& logic, const std::string& id) {
   MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, logic.Get(id));
   MW_ASSIGN_OR_RETURN(const v1::ListCamerasResponse cameras, logic.ListCameras(id));
+  MW_ASSIGN_OR_RETURN(const v1::ListAttemptsResponse attempts, LastAttempts(logic, id));
   std::vector<LogEntry> entries;
   entries.push_back({TimeOf(reconstruction.create_time()), kInfo, "created"});
   const absl::Time now = reconstruction.has_finish_time() ? TimeOf(reconstruction.finish_time()) : absl::Now();
+  std::map<int32_t, absl::Time> last_end;
+  for (const v1::Attempt& attempt : attempts.attempts()) {
+    if (!attempt.has_end_time()) continue;
+    last_end.try_emplace(attempt.camera(), TimeOf(attempt.end_time()));
+    const bool is_known = attempt.camera() >= 0 && attempt.camera() < cameras.cameras_size();
+    auto entry = EntryOf(attempt, is_known ? cameras.cameras(attempt.camera()).name() : "a camera");
+    if (entry) entries.push_back(*std::move(entry));
+  }
+  // Attempts come with the last ones first, and of the same moment the last one is to be told last.
+  std::reverse(entries.begin() + 1, entries.end());
   for (const v1::Camera& camera : cameras.cameras()) {
     if (camera.state() != v1::CAMERA_STATE_SET_ASIDE) continue;
-    entries.push_back(
-        {now, kWarning, absl::StrCat(camera.name(), " was set aside: ", camera.set_aside_reason()), camera.index()});
+    const auto end = last_end.find(camera.index());
+    entries.push_back({end != last_end.end() ? end->second : now, kError,
+                       absl::StrCat(camera.name(), " was set aside: ", camera.set_aside_reason()), camera.index()});
   }
   if (reconstruction.has_finish_time()) {
     const bool failed = reconstruction.state() == v1::RECONSTRUCTION_STATE_FAILED;

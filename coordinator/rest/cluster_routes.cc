@@ -28,10 +28,11 @@ void AddClusterRoutes(const RestContext& context, std::vector<Route>& routes) {
   };
   add("GET", "/v1/workers",
       [&context](RestCall& call) { return Say(call, ToJson(context.workers->ListWorkers()), kJsonType); });
-  add("POST", "/v1/workers/{worker}:drain",
-      [](RestCall&) { return absl::UnimplementedError("workers are drained by SIGTERM so far"); });
-  add("GET", "/v1/reconstructions/{id}/attempts",
-      [](RestCall&) { return absl::UnimplementedError("attempts are not kept so far"); });
+  add("POST", "/v1/workers/{worker}:drain", [&context](RestCall& call) -> absl::Status {
+    MW_RETURN_IF_ERROR(context.workers->Drain(call.path.at("worker")));
+    call.response.status = 204;
+    return absl::OkStatus();
+  });
   add("GET", "/v1/options", [&context](RestCall& call) { return Say(call, context.options_json, kJsonType); });
   add("GET", "/v1/openapi.yaml",
       [](RestCall& call) { return Say(call, RestDescriptions().front().second, "application/yaml"); });

@@ -24,16 +24,17 @@ std::string Event(int64_t id, const char* name, const std::string& data) {
 // One watched reconstruction. Needs the lock.
 struct EventFeeds::Feed {
   struct PartEvent {
-    int64_t sequence = 0;
-    std::string json;
+    SequenceNumber sequence = 0;
+    std::string text;  // as it is sent, to whomever
   };
   int watchers = 0;
-  int64_t version = 0;  // of `reconstruction`; 0: not looked at yet
+  bool looked = false;
+  int64_t version = 0;  // of `reconstruction`; 0: there is none yet
   std::string reconstruction;
   int64_t committed = -1;  // as of which the parts were listed
   std::vector<PartEvent> parts;
   bool over = false;  // nothing will change any more
-  bool gone = false;  // deleted, or the store cannot be reached
+  bool gone = false;  // deleted
 };
 
 EventFeeds::EventFeeds(const ReconstructionLogic& logic, const EventFeedOptions& options)
@@ -84,15 +85,11 @@ void EventFeeds::Run() {
     const std::map<std::string, std::shared_ptr<Feed>> watched = feeds_;
     lock.unlock();
     bool changing = false;
-    for (const auto& [id, feed] : watched) {
-      Look(id, feed);
-      changing = true;
-    }
+    for (const auto& [id, feed] : watched) changing = Look(id, *feed) || changing;
     lock.lock();
     const auto fresh = [&] {
-      return stopping_ || std::any_of(feeds_.begin(), feeds_.end(), [](const auto& entry) {
-               return entry.second->version == 0 && !entry.second->gone;
-             });
+      return stopping_ ||
+             std::any_of(feeds_.begin(), feeds_.end(), [](const auto& entry) { return !entry.second->looked; });
     };
     if (changing) {
       wake_.wait_for(lock, absl::ToChronoMilliseconds(options_.look_again), fresh);
@@ -102,45 +99,52 @@ void EventFeeds::Run() {
   }
 }
 
-void EventFeeds::Look(const std::string& id, const std::shared_ptr<Feed>& feed) {
+bool EventFeeds::Look(const std::string& id, Feed& feed) {
   int64_t committed = 0;
-  size_t known = 0;
+  SequenceNumber known = 0;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (feed->over || feed->gone) return;
-    committed = feed->committed;
-    known = feed->parts.size();
+    if (feed.over || feed.gone) return false;
+    feed.looked = true;
+    committed = feed.committed;
+    if (!feed.parts.empty()) known = feed.parts.back().sequence;
   }
+  // Parts after the reconstruction: when that is over there are no more than these.
   const absl::StatusOr<v1::Reconstruction> now = logic_.Get(id);
+  absl::Status status = now.status();
   const bool over = now.ok() && IsOver(now->state());
   std::vector<Feed::PartEvent> added;
-  absl::Status status = now.status();
   if (status.ok() && (over || now->progress().cameras_committed() != committed)) {
-    const absl::StatusOr<v1::ListPartsResponse> parts = logic_.ListParts(id);
+    const absl::StatusOr<v1::ListPartsResponse> parts = logic_.ListParts(id, known);
     status = parts.status();
-    for (int i = static_cast<int>(known); parts.ok() && i < parts->parts_size(); ++i) {
-      added.push_back({parts->parts(i).sequence(), ToJson(parts->parts(i))});
+    for (int i = 0; parts.ok() && i < parts->parts_size(); ++i) {
+      const v1::Part& part = parts->parts(i);
+      added.push_back({part.sequence(), Event(part.sequence(), "part", ToJson(part))});
     }
   }
+  // Whoever comes back hears why. A store that cannot be reached comes back itself.
+  if (!status.ok() && !absl::IsNotFound(status)) return true;
   const std::string json = status.ok() ? ToJson(*now) : "";
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!status.ok()) {
-      // Whoever comes back hears why.
-      feed->gone = true;
+      feed.gone = true;
       const auto found = feeds_.find(id);
-      if (found != feeds_.end() && found->second == feed) feeds_.erase(found);
-    } else {
-      if (json != feed->reconstruction) {
-        feed->reconstruction = json;
-        ++feed->version;
+      if (found != feeds_.end() && found->second.get() == &feed) feeds_.erase(found);
+    } else if (json != feed.reconstruction || !added.empty() || over) {
+      if (json != feed.reconstruction) {
+        feed.reconstruction = json;
+        ++feed.version;
       }
-      feed->committed = now->progress().cameras_committed();
-      for (Feed::PartEvent& part : added) feed->parts.push_back(std::move(part));
-      feed->over = over;
+      feed.committed = now->progress().cameras_committed();
+      for (Feed::PartEvent& part : added) feed.parts.push_back(std::move(part));
+      feed.over = over;
+    } else {
+      return true;
     }
   }
   news_.notify_all();
+  return !over;
 }
 
 EventFeeds::Stream::Stream(EventFeeds& feeds, std::string id, std::shared_ptr<Feed> feed, int64_t after_part)
@@ -168,7 +172,7 @@ std::string EventFeeds::Stream::Next() {
       const Feed::PartEvent& part = feed_->parts[next_part_];
       if (part.sequence <= last_part_) continue;
       last_part_ = part.sequence;
-      absl::StrAppend(&text, Event(last_part_, "part", part.json));
+      text += part.text;
       ++count;
     }
     if (feed_->over && next_part_ == feed_->parts.size()) {

@@ -66,7 +66,8 @@ class EventFeeds {
 
  private:
   void Run();
-  void Look(const std::string& id, const std::shared_ptr<Feed>& feed);
+  // Whether there may be news later.
+  bool Look(const std::string& id, Feed& feed);
 
   const ReconstructionLogic& logic_;
   const EventFeedOptions options_;

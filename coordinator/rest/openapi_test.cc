@@ -1,4 +1,4 @@
-// Holds the OpenAPI file against the routes, both ways: paths, methods and query parameters.
+// Holds the OpenAPI file against the routes, both ways: paths, methods and query parameters; and against the messages.
 
 #include <map>
 #include <regex>
@@ -47,6 +47,54 @@ Operations OperationsInFile() {
     }
   }
   return operations;
+}
+
+// Schemas of objects -> names of their properties, which are indented by eight blanks.
+Operations SchemasInFile() {
+  static const std::regex schema_line("    ([A-Z][A-Za-z0-9]*):");
+  static const std::regex property_line("        ([a-z][A-Za-z0-9]*):.*");
+  Operations schemas;
+  std::istringstream lines(RestDescriptions().front().second);
+  std::string line, schema;
+  bool is_schema = false;
+  bool is_property = false;
+  for (std::smatch match; std::getline(lines, line);) {
+    if (line == "  schemas:") is_schema = true;
+    if (!is_schema) continue;
+    if (std::regex_match(line, match, schema_line)) {
+      schema = match[1];
+      is_property = false;
+    } else if (line.rfind("      ", 0) == 0 && line[6] != ' ') {
+      is_property = line == "      properties:";
+    } else if (is_property && std::regex_match(line, match, property_line)) {
+      schemas[schema].insert(match[1]);
+    }
+  }
+  return schemas;
+}
+
+TEST(OpenApiTest, SaysWhatTheMessagesHave) {
+  const Operations schemas = SchemasInFile();
+  const auto expect = [&](const google::protobuf::Descriptor* message, const std::set<std::string>& added = {}) {
+    std::set<std::string> names = added;
+    for (int i = 0; i < message->field_count(); ++i) names.insert(message->field(i)->json_name());
+    const auto found = schemas.find(message->name());
+    ASSERT_TRUE(found != schemas.end()) << message->name();
+    EXPECT_EQ(found->second, names) << message->name();
+  };
+  expect(v1::Reconstruction::descriptor());
+  expect(v1::Progress::descriptor());
+  expect(v1::CreateReconstructionRequest::descriptor());
+  expect(v1::ListReconstructionsResponse::descriptor());
+  expect(v1::Camera::descriptor(), {"attempts", "geometry", "seconds", "shares"});
+  expect(v1::ListCamerasResponse::descriptor());
+  expect(v1::GetIncidenceResponse::descriptor());
+  expect(v1::Part::descriptor());
+  expect(v1::ListPartsResponse::descriptor());
+  expect(v1::Attempt::descriptor());
+  expect(v1::ListAttemptsResponse::descriptor());
+  expect(v1::Worker::descriptor());
+  expect(v1::ListWorkersResponse::descriptor());
 }
 
 TEST(OpenApiTest, SaysWhatTheRoutesAreAndNothingElse) {

@@ -15,6 +15,7 @@ namespace meshwright {
 namespace {
 
 constexpr int64_t kMaxJsonBytes = int64_t{1} << 20;
+constexpr int64_t kMaxAttempts = 100'000;
 constexpr int64_t kMaxSequence = 2'000'000'000;
 
 absl::Status Answer(RestCall& call, const absl::StatusOr<v1::Reconstruction>& reconstruction) {
@@ -109,6 +110,14 @@ absl::Status Cameras(const RestContext& context, RestCall& call) {
   return absl::OkStatus();
 }
 
+absl::Status Attempts(const RestContext& context, RestCall& call) {
+  v1::ListAttemptsRequest request;
+  request.set_id(call.path.at("id"));
+  MW_ASSIGN_OR_RETURN(const int64_t max_attempts, QueryNumber(call, "maxAttempts", 0, kMaxAttempts, 0));
+  request.set_max_attempts(static_cast<int32_t>(max_attempts));
+  return AnswerAny(call, context.reconstructions->ListAttempts(request));
+}
+
 absl::Status Log(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const nlohmann::ordered_json log, LogJson(*context.reconstructions, call.path.at("id")));
   call.response.set_content(Dump(log), kJsonType);
@@ -136,6 +145,7 @@ void AddReconstructionRoutes(const RestContext& context, std::vector<Route>& rou
   add("GET", "/v1/reconstructions/{id}/incidence", {}, [](const RestContext& to, RestCall& call) {
     return AnswerAny(call, to.reconstructions->GetIncidence(call.path.at("id")));
   });
+  add("GET", "/v1/reconstructions/{id}/attempts", {"maxAttempts"}, Attempts);
   add("GET", "/v1/reconstructions/{id}/log", {}, Log);
 }
 

@@ -17,6 +17,7 @@
 namespace meshwright {
 namespace {
 
+constexpr int64_t kMaxSequence = std::numeric_limits<SequenceNumber>::max();
 constexpr char kPlyType[] = "model/ply";
 constexpr int64_t kDefaultPreviewFaces = 20'000;
 constexpr int64_t kMaxPreviewFaces = 4'000'000;
@@ -24,17 +25,14 @@ constexpr int64_t kMaxPreviewFaces = 4'000'000;
 constexpr int64_t kMaxGlbSourceBytes = int64_t{1} << 30;
 
 absl::StatusOr<v1::Part> FindPart(const RestContext& context, const RestCall& call) {
-  MW_ASSIGN_OR_RETURN(const int64_t sequence, PathNumber(call, "sequence", 1, std::numeric_limits<int32_t>::max()));
-  MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts, context.reconstructions->ListParts(call.path.at("id")));
-  for (const v1::Part& part : parts.parts()) {
-    if (part.sequence() == sequence) return part;
-  }
-  return absl::NotFoundError(
-      absl::StrCat("sequence is ", sequence, ", which is no part of reconstruction ", call.path.at("id")));
+  MW_ASSIGN_OR_RETURN(const int64_t sequence, PathNumber(call, "sequence", 1, kMaxSequence));
+  return context.reconstructions->GetPart(call.path.at("id"), static_cast<SequenceNumber>(sequence));
 }
 
 absl::Status ListParts(const RestContext& context, RestCall& call) {
-  MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts, context.reconstructions->ListParts(call.path.at("id")));
+  MW_ASSIGN_OR_RETURN(const int64_t after, QueryNumber(call, "after", 0, kMaxSequence, 0));
+  MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts,
+                      context.reconstructions->ListParts(call.path.at("id"), static_cast<SequenceNumber>(after)));
   call.response.set_content(ToJson(parts), kJsonType);
   return absl::OkStatus();
 }
@@ -122,7 +120,7 @@ void AddResultRoutes(const RestContext& context, std::vector<Route>& routes) {
     routes.push_back({"GET", path, std::move(query),
                       [&context, handler](RestCall& call) -> absl::Status { return handler(context, call); }});
   };
-  add("/v1/reconstructions/{id}/parts", {}, ListParts);
+  add("/v1/reconstructions/{id}/parts", {"after"}, ListParts);
   add("/v1/reconstructions/{id}/parts/{sequence}", {}, DownloadPart);
   add("/v1/reconstructions/{id}/parts/{sequence}/preview", {"max_faces"}, PreviewPart);
   add("/v1/reconstructions/{id}/mesh", {"partial"}, DownloadMesh);

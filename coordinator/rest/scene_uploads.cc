@@ -234,6 +234,12 @@ absl::Status SceneUploads::Deliver(const std::string& id, const SceneFileState& 
   return upload.Finish();
 }
 
+bool SceneUploads::HasTaken(const std::string& id, const SceneFileState& state) const {
+  const absl::StatusOr<std::vector<SceneFile>> taken = logic_.ListSceneFiles(id);
+  return taken.ok() &&
+         std::find(taken->begin(), taken->end(), SceneFile{state.path, state.size_bytes, state.sha256}) != taken->end();
+}
+
 absl::StatusOr<SceneFileState> SceneUploads::Put(const std::string& id, const SceneFilePart& part, const Read& read,
                                                  int64_t* expected_offset) {
   MW_RETURN_IF_ERROR(CheckTakesFiles(id));
@@ -257,7 +263,9 @@ absl::StatusOr<SceneFileState> SceneUploads::Put(const std::string& id, const Sc
   std::error_code error;
   fs::create_directories(fs::path(state_path).parent_path(), error);
   const std::string bytes_path = state_path + kBytesEnding;
-  const std::optional<SceneFileState> before = Load(state_path);
+  std::optional<SceneFileState> before = Load(state_path);
+  // It may have been replaced by another way since.
+  if (before && before->complete && !HasTaken(id, *before)) before.reset();
   SceneFileState state = before.value_or(SceneFileState{.path = part.path});
   const bool same_file = before && state.size_bytes == part.size_bytes && state.sha256 == part.sha256;
   if (same_file && state.complete) {
@@ -309,7 +317,20 @@ absl::StatusOr<std::vector<SceneFileState>> SceneUploads::List(const std::string
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(absl::StrCat(folder_, "/", id), error)) {
     if (entry.path().extension() != kStateEnding) continue;
-    if (auto state = Load(entry.path())) files.push_back(*std::move(state));
+    auto state = Load(entry.path());
+    if (state && !state->complete) files.push_back(*std::move(state));
+  }
+  // What is complete the reconstruction says: it may have come by another way.
+  MW_ASSIGN_OR_RETURN(const std::vector<SceneFile> taken, logic_.ListSceneFiles(id));
+  std::set<std::string> begun;
+  for (const SceneFileState& file : files) begun.insert(file.path);
+  for (const SceneFile& file : taken) {
+    if (begun.count(file.path) > 0) continue;  // is being replaced
+    files.push_back({.path = file.path,
+                     .size_bytes = file.size_bytes,
+                     .sha256 = file.digest,
+                     .offset_bytes = file.size_bytes,
+                     .complete = true});
   }
   std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
   return files;

@@ -52,7 +52,7 @@ class SceneUploads {
   absl::StatusOr<SceneFileState> Put(const std::string& id, const SceneFilePart& part, const Read& read,
                                      int64_t* expected_offset);
   absl::StatusOr<SceneFileState> Get(const std::string& id, const std::string& path) const;
-  // Begun and complete ones by path; none once it was started.
+  // Those begun here and those that the reconstruction has, by path; none once it was started.
   absl::StatusOr<std::vector<SceneFileState>> List(const std::string& id) const;
   // Removes what belongs to reconstructions that take no files any more.
   void Sweep() const;
@@ -63,6 +63,7 @@ class SceneUploads {
   absl::Status CheckTakesFiles(const std::string& id) const;
   std::string StatePath(const std::string& id, const std::string& path) const;
   absl::Status Save(const std::string& id, const SceneFileState& state) const;
+  bool HasTaken(const std::string& id, const SceneFileState& state) const;
   absl::Status Deliver(const std::string& id, const SceneFileState& state) const;
 
   const std::string folder_;

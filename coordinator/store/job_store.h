@@ -191,7 +191,7 @@ struct WorkerRecord {
   int64_t cores = 0;
   int64_t memory_bytes = 0;
   absl::Time last_heartbeat = absl::UnixEpoch();
-  bool drained = false;  // its operator wants no more jobs for it
+  bool drained = false;  // its operator wants no more jobs for this process of it; heartbeats do not say it
   std::string instance;  // of its process
   std::string version;
   bool draining = false;  // it says so itself
@@ -299,8 +299,9 @@ class JobStore {
   virtual absl::Status Advance(const std::string& id, const std::vector<Commit>& commits,
                                const std::vector<CameraAssignment>& assignments, const StoredProgress& progress,
                                absl::Time now, int64_t conductor_epoch = 0) = 0;
-  // By sequence, those with a number greater than `after`.
-  virtual absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after = 0) = 0;
+  // By sequence, at most `limit` of those with a number greater than `after`.
+  virtual absl::StatusOr<std::vector<Commit>> ListCommits(
+      const std::string& id, SequenceNumber after = 0, int64_t limit = std::numeric_limits<int64_t>::max()) = 0;
 
   // Takes a reconstruction that nobody conducts (or no longer, or `owner` itself) and returns the epoch, which grows
   // with every call: who conducted before cannot write any more. FailedPrecondition while somebody else holds it.

@@ -656,6 +656,8 @@ TEST_P(JobStoreConformance, ListsCanBeReadInPieces) {
     ASSERT_TRUE(store().AddCommit("castle", {s, s, "", 0, 0}, kNow).ok());
   }
   EXPECT_THAT(*store().ListCommits("castle", 2), testing::ElementsAre(Commit{3, 3, "", 0, 0}));
+  ASSERT_EQ(store().ListCommits("castle")->size(), 3U);
+  EXPECT_THAT(*store().ListCommits("castle", 1, 1), testing::ElementsAre(store().ListCommits("castle")->at(1)));
 }
 
 TEST_P(JobStoreConformance, TextIsKeptAsItIs) {
@@ -677,6 +679,11 @@ TEST_P(JobStoreConformance, WorkersAreKnownByTheirHeartbeats) {
   const WorkerRecord bee = {.id = "bee", .cores = 4, .memory_bytes = 8'000'000'000, .last_heartbeat = kNow};
   WorkerRecord ant = {.id = "ant", .cores = 2, .memory_bytes = 1'000, .last_heartbeat = kNow};
   ASSERT_TRUE(store().ApplyChanges({}, {bee, ant}, kNow).ok());
+  ASSERT_TRUE(store().SetWorkerDrained("ant", true).ok());
+  // It was drained as one process and comes as another one, which is drained in turn.
+  ant.instance = "x";
+  ASSERT_TRUE(store().ApplyChanges({}, {ant}, kNow).ok());
+  EXPECT_FALSE(store().ListWorkers()->at(0).drained);
   ASSERT_TRUE(store().SetWorkerDrained("ant", true).ok());
   ant = {.id = "ant",
          .cores = 3,

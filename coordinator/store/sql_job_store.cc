@@ -384,8 +384,10 @@ absl::Status SqlJobStore::Advance(const std::string& id, const std::vector<Commi
   return result.changed == 1 ? absl::OkStatus() : CheckConductor(id, conductor_epoch);
 }
 
-absl::StatusOr<std::vector<Commit>> SqlJobStore::ListCommits(const std::string& id, SequenceNumber after) {
-  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run("list_commits", {{"id", id}, {"after", after}}));
+absl::StatusOr<std::vector<Commit>> SqlJobStore::ListCommits(const std::string& id, SequenceNumber after,
+                                                               int64_t limit) {
+  MW_ASSIGN_OR_RETURN(const SqlResult result,
+                      database_->Run("list_commits", {{"id", id}, {"after", after}, {"limit", limit}}));
   std::vector<Commit> commits;
   commits.reserve(result.rows.size());
   for (const SqlRow& row : result.rows) commits.push_back(ReadCommit(row));

@@ -50,7 +50,7 @@ class SqlJobStore : public JobStore {
   absl::Status Advance(const std::string& id, const std::vector<Commit>& commits,
                        const std::vector<CameraAssignment>& assignments, const StoredProgress& progress, absl::Time now,
                        int64_t conductor_epoch) override;
-  absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after) override;
+  absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after, int64_t limit) override;
   absl::StatusOr<int64_t> AcquireConductorLease(const std::string& id, const std::string& owner, absl::Time expires_at,
                                                 absl::Time now) override;
   absl::Status RenewConductorLease(const std::string& id, int64_t epoch, absl::Time expires_at,

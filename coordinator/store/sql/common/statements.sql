@@ -193,7 +193,7 @@ FROM commits WHERE reconstruction_id = :id AND sequence = :sequence;
 
 -- name: list_commits
 SELECT sequence, camera, accepted_digest, filtered_patches, accepted_patches
-FROM commits WHERE reconstruction_id = :id AND sequence > :after ORDER BY sequence;
+FROM commits WHERE reconstruction_id = :id AND sequence > :after ORDER BY sequence LIMIT :limit;
 
 -- name: acquire_conductor_lease
 INSERT INTO conductor_leases AS held (reconstruction_id, owner, epoch, expires_at)
@@ -223,6 +223,7 @@ INSERT INTO workers (id, cores, memory_bytes, last_heartbeat, instance, version,
 VALUES (:worker, :cores, :memory_bytes, :now, :instance, :version, :draining)
 ON CONFLICT (id) DO UPDATE
 SET cores = excluded.cores, memory_bytes = excluded.memory_bytes, last_heartbeat = excluded.last_heartbeat,
+    drained = CASE WHEN workers.instance = excluded.instance THEN workers.drained ELSE 0 END,
     instance = excluded.instance, version = excluded.version, draining = excluded.draining;
 
 -- name: set_worker_drained
