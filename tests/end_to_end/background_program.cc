@@ -41,8 +41,7 @@ int BackgroundProgram::Stop(int signal) {
   return status;
 }
 
-std::string ListeningPort(const std::string& log) {
-  const std::string said = "listening on port ";
+std::string ListeningPort(const std::string& log, const std::string& said) {
   std::string text;
   const bool heard = WaitUntil(
       [&] {

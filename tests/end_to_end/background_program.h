@@ -36,7 +36,8 @@ bool WaitUntil(const Condition& condition, double seconds) {
   return true;
 }
 
-// Waits until a coordinator that logs to this file says on which port it listens; aborts after a minute.
-std::string ListeningPort(const std::string& log);
+// Waits until a coordinator that logs to this file says on which port it listens, with these words; aborts after a
+// minute.
+std::string ListeningPort(const std::string& log, const std::string& said = "listening on port ");
 
 }  // namespace meshwright::end_to_end

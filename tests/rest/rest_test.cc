@@ -7,6 +7,7 @@
 
 #include "common/mesh/ply.h"
 #include "tests/rest/rest_cluster.h"
+#include "worker/agent/grpc_coordinator.h"
 
 namespace meshwright {
 namespace {
@@ -150,12 +151,33 @@ TEST_F(RestTest, FromAnInterruptedUploadToTheMesh) {
   for (const Json& camera : cameras) {
     EXPECT_EQ(camera["geometry"]["rotation"].size(), 9U);
     EXPECT_EQ(camera["geometry"]["width"], 160);
+    EXPECT_EQ(camera["attempts"], 1);
+    EXPECT_EQ(camera["worker"], "w");
     EXPECT_GT(camera["shares"]["grown"].get<double>() + camera["shares"]["coveredBefore"].get<double>(), 0);
   }
   const auto photo = http_->Get(base + "/cameras/0/photo?width=40");
   EXPECT_EQ(photo->get_header_value("Content-Type"), "image/jpeg");
   EXPECT_THAT(photo->body, StartsWith("\xff\xd8"));
-  EXPECT_FALSE(GetJson(base + "/log")["entries"].empty());
+  const Json entries = GetJson(base + "/log")["entries"];
+  ASSERT_EQ(entries.size(), 2U);  // nothing went wrong
+  EXPECT_EQ(entries[0]["message"], "created");
+  EXPECT_EQ(entries[1]["message"], "done");
+
+  // Every camera was handed out once, and its job came to a good end.
+  const Json attempts = GetJson(base + "/attempts")["attempts"];
+  ASSERT_EQ(attempts.size(), 5U);
+  std::set<int> attempted;
+  for (const Json& attempt : attempts) {
+    attempted.insert(attempt["camera"].get<int>());
+    EXPECT_EQ(attempt["worker"], "w");
+    EXPECT_EQ(attempt["ending"], "ATTEMPT_ENDING_FINISHED");
+    EXPECT_LE(attempt["beginTime"].get<std::string>(), attempt["endTime"].get<std::string>());
+  }
+  EXPECT_EQ(attempted.size(), 5U);
+  EXPECT_EQ(GetJson(base + "/attempts?maxAttempts=2")["attempts"].size(), 2U);
+  EXPECT_EQ(http_->Get(base + "/attempts?maxAttempts=-1")->status, 400);
+  const Json later = GetJson(absl::StrCat(base, "/parts?after=", parts.front()["sequence"].get<int>()))["parts"];
+  EXPECT_EQ(later, Json(std::vector<Json>(parts.begin() + 1, parts.end())));
 
   EXPECT_EQ(http_->Delete(base)->status, 204);
   EXPECT_EQ(http_->Get(base)->status, 404);
@@ -181,6 +203,77 @@ TEST_F(RestTest, TheMeshSoFarWhileItRuns) {
   }
   EXPECT_GE(faces.size(), 1U);
   EXPECT_EQ(Sha256Hex(http_->Get(base + "/mesh?partial=true")->body), GetJson(base)["meshSha256"]);
+}
+
+TEST_F(RestTest, ADrainedWorkerGetsNothing) {
+  EXPECT_EQ(http_->Post("/v1/workers/w:drain")->status, 404);
+  StartWorker();
+  while (GetJson("/v1/workers")["workers"].empty()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(http_->Post("/v1/workers/w:drain")->status, 204);
+  EXPECT_EQ(http_->Post("/v1/workers/w:drain")->status, 204);
+  Create("waits");
+  UploadScene("waits");
+  ASSERT_EQ(http_->Post("/v1/reconstructions/waits:start")->status, 200);
+  // Nothing is handed out, and its owner is told.
+  Json waits;
+  do {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    waits = GetJson("/v1/reconstructions/waits");
+  } while (waits["warnings"].empty());
+  EXPECT_THAT(waits["warnings"][0].get<std::string>(), HasSubstr("no worker"));
+  EXPECT_TRUE(GetJson("/v1/reconstructions/waits/attempts")["attempts"].empty());
+  const Json worker = GetJson("/v1/workers")["workers"][0];
+  EXPECT_TRUE(worker["draining"].get<bool>());
+  EXPECT_EQ(worker["jobs"], 0);
+}
+
+// Cameras that cannot be read fail; why is in the log, and who tried.
+TEST_F(RestTest, TheLogSaysWhatFailedAndWhy) {
+  Create("poor");
+  UploadScene("poor");
+  ASSERT_EQ(http_->Post("/v1/reconstructions/poor:start")->status, 200);
+  while (GetJson("/v1/reconstructions/poor")["progress"]["camerasTotal"] == 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  const auto channel = GrpcCoordinator::Connect(absl::StrCat("127.0.0.1:", coordinator_->port()));
+  v1::SynchronizeRequest request;
+  request.set_worker_id("clumsy");
+  request.set_instance("1");
+  request.set_cores(1);
+  request.set_memory_bytes(int64_t{1} << 40);
+  request.set_patience_seconds(1);
+  const auto first = channel->Synchronize(request);
+  ASSERT_TRUE(first.ok()) << first.status();
+  ASSERT_EQ(first->jobs_size(), 1);
+  // What it does now is seen.
+  const Json running = GetJson("/v1/workers")["workers"][0]["running"];
+  ASSERT_EQ(running.size(), 1U);
+  EXPECT_EQ(running[0]["reconstructionId"], "poor");
+  EXPECT_EQ(running[0]["camera"], first->jobs(0).camera());
+  EXPECT_EQ(running[0]["ending"], "ATTEMPT_ENDING_UNSPECIFIED");
+  EXPECT_FALSE(running[0].contains("endTime"));
+  EXPECT_EQ(GetJson("/v1/reconstructions/poor/attempts")["attempts"], running);
+
+  request.set_draining(true);
+  *request.add_held()->mutable_key() = first->jobs(0).key();
+  request.mutable_held(0)->mutable_failed()->set_reason("dropped it");
+  ASSERT_TRUE(channel->Synchronize(request).ok());
+  const Json attempts = GetJson("/v1/reconstructions/poor/attempts")["attempts"];
+  ASSERT_EQ(attempts.size(), 1U);
+  EXPECT_EQ(attempts[0]["ending"], "ATTEMPT_ENDING_FAILED");
+  const Json entries = GetJson("/v1/reconstructions/poor/log")["entries"];
+  ASSERT_EQ(entries.size(), 2U);
+  EXPECT_EQ(entries[1]["severity"], "warning");
+  EXPECT_EQ(entries[1]["worker"], "clumsy");
+  EXPECT_EQ(entries[1]["camera"], first->jobs(0).camera());
+  EXPECT_THAT(entries[1]["message"].get<std::string>(), HasSubstr("failed: dropped it"));
+  EXPECT_EQ(entries[1]["time"].get<std::string>().substr(0, 19),
+            attempts[0]["endTime"].get<std::string>().substr(0, 19));
+  const Json camera = GetJson("/v1/reconstructions/poor/cameras")["cameras"][first->jobs(0).camera()];
+  EXPECT_EQ(camera["attempts"], 1);
+  EXPECT_EQ(camera["failedAttempts"], 1);
+  EXPECT_EQ(camera["lastFailure"], "dropped it");
+  EXPECT_EQ(camera["worker"], "clumsy");
 }
 
 TEST_F(RestTest, ListsInPages) {

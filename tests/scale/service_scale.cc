@@ -6,6 +6,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <sstream>
 #include <thread>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +14,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/time/clock.h>
 #include <nlohmann/json.hpp>
+#include <unistd.h>
 
 #include "cli/service/service_client.h"
 #include "common/base/check.h"
@@ -20,6 +22,7 @@
 #include "coordinator/store/postgres_testing.h"
 #include "tests/end_to_end/background_program.h"
 #include "tests/end_to_end/program.h"
+#include "tests/scale/event_listeners.h"
 #include "tests/scale/fake_worker.h"
 #include "tests/scale/wall_world.h"
 #include "worker/agent/grpc_coordinator.h"
@@ -36,6 +39,7 @@ struct Settings {
   int workers = 200;
   int job_ms = 300;
   int window = 400;
+  int event_streams = 0;  // of the first reconstruction
 };
 
 double PeakMebibytes(pid_t process) {
@@ -44,6 +48,21 @@ double PeakMebibytes(pid_t process) {
     if (absl::StartsWith(line.c_str(), "VmHWM:")) return std::stod(line.substr(6)) / 1024;
   }
   return 0;
+}
+
+// Of the process so far.
+double CpuSeconds(pid_t process) {
+  std::ifstream stat(absl::StrCat("/proc/", process, "/stat"));
+  std::string text;
+  std::getline(stat, text);
+  // Behind the name, which may have blanks in it: user and system time are the 12th and 13th.
+  std::istringstream fields(text.substr(text.rfind(')') + 1));
+  std::string skipped;
+  for (int i = 0; i < 11; ++i) fields >> skipped;
+  double user = 0;
+  double system = 0;
+  fields >> user >> system;
+  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
 double Percentile(std::vector<double>& values, double share) {
@@ -59,8 +78,9 @@ int Measure(const Settings& settings) {
   if (settings.reconstructions > 1) WallWorld(settings.small_cameras).Write(folder / "scenes/small");
 
   std::unique_ptr<PostgresServer> postgres;
-  std::vector<std::string> arguments = {"--data",       folder / "data",   "--listen",        "127.0.0.1:0",
-                                        "--scene-root", folder / "scenes", "--lease-seconds", "30"};
+  std::vector<std::string> arguments = {"--data",        folder / "data",   "--listen",        "127.0.0.1:0",
+                                        "--scene-root",  folder / "scenes", "--lease-seconds", "30",
+                                        "--rest-listen", "127.0.0.1:0"};
   if (settings.store == "postgres") {
     auto started = PostgresServer::Start(/*durable=*/true);
     MW_CHECK(started.ok());
@@ -97,6 +117,7 @@ int Measure(const Settings& settings) {
     workers.push_back(std::make_unique<FakeWorker>(absl::StrCat("worker-", i), *channels.back(), **blobs,
                                                    absl::Milliseconds(settings.job_ms)));
   }
+  EventListeners listeners(end_to_end::ListeningPort(log, "HTTP on port "), name_of(0), settings.event_streams);
   std::vector<FakeWorkerFigures> figures(workers.size());
   std::vector<std::thread> threads;
   const absl::Time begun = absl::Now();
@@ -141,6 +162,13 @@ int Measure(const Settings& settings) {
                             {"max", 1e3 * Percentile(answers, 1)}};
   json["failed_calls"] = failed_calls;
   json["idle_share"] = 1 - busy / (elapsed * settings.workers);
+  json["coordinator_cpu_s"] = CpuSeconds(coordinator.id());
+  if (settings.event_streams > 0) {
+    json["event_streams"] = {{"clients", settings.event_streams},
+                             {"dropped", listeners.dropped()},
+                             {"parts_read_per_client", static_cast<double>(listeners.parts()) / settings.event_streams},
+                             {"bytes_read", listeners.bytes()}};
+  }
   json["coordinator_peak_mib"] = PeakMebibytes(coordinator.id());
   std::vector<double> small;
   for (const auto& [name, seconds] : ended) {
@@ -170,6 +198,8 @@ int main(int argc, char** argv) {
   program.add_option("--workers", settings.workers)->capture_default_str();
   program.add_option("--job-ms", settings.job_ms)->capture_default_str();
   program.add_option("--window", settings.window)->capture_default_str();
+  program.add_option("--event-streams", settings.event_streams, "clients that follow the first reconstruction")
+      ->capture_default_str();
   CLI11_PARSE(program, argc, argv);
   return meshwright::scale::Measure(settings);
 }
