@@ -300,8 +300,8 @@ class JobStore {
                                const std::vector<CameraAssignment>& assignments, const StoredProgress& progress,
                                absl::Time now, int64_t conductor_epoch = 0) = 0;
   // By sequence, at most `limit` of those with a number greater than `after`.
-  virtual absl::StatusOr<std::vector<Commit>> ListCommits(
-      const std::string& id, SequenceNumber after = 0, int64_t limit = std::numeric_limits<int64_t>::max()) = 0;
+  virtual absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after = 0,
+                                                          int64_t limit = std::numeric_limits<int64_t>::max()) = 0;
 
   // Takes a reconstruction that nobody conducts (or no longer, or `owner` itself) and returns the epoch, which grows
   // with every call: who conducted before cannot write any more. FailedPrecondition while somebody else holds it.

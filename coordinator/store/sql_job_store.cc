@@ -385,7 +385,7 @@ absl::Status SqlJobStore::Advance(const std::string& id, const std::vector<Commi
 }
 
 absl::StatusOr<std::vector<Commit>> SqlJobStore::ListCommits(const std::string& id, SequenceNumber after,
-                                                               int64_t limit) {
+                                                             int64_t limit) {
   MW_ASSIGN_OR_RETURN(const SqlResult result,
                       database_->Run("list_commits", {{"id", id}, {"after", after}, {"limit", limit}}));
   std::vector<Commit> commits;
