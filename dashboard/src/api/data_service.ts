@@ -1,14 +1,14 @@
 import type { PartGeometry } from '../view3d/preview_decoder';
 import type { CameraTable } from './camera_table';
 import { ApiError } from './client';
-import type { Attempt, Camera, HeldCamera } from './types';
+import type { Attempt, Camera } from './types';
 
 interface Answers {
   cameras: CameraTable;
   camera: Camera | null;
   incidence: Int32Array; // reference, target, reference, target ...
   attempts: Attempt[];
-  held: HeldCamera[];
+  held: Attempt[]; // those that run
   preview: PartGeometry;
 }
 

@@ -1,10 +1,13 @@
 // Fetches what is large and turns it into columns and buffers, so that the page's own thread never parses it.
 import { decodePreview } from '../view3d/preview_decoder';
 import { makeCameraTable } from './camera_table';
-import type { Attempt, Camera, HeldCamera } from './types';
+import { runs, type Attempt, type Camera } from './types';
 import type { DataRequest, DataResponse } from './data_service';
 
 const post = self.postMessage.bind(self) as (message: DataResponse, transfer: Transferable[]) => void;
+// A chart shows no more, and no window is larger.
+const MOST_ATTEMPTS = 20_000;
+const MOST_RUNNING = 1000;
 const cancelled = new Map<number, AbortController>();
 
 async function get(url: string, signal: AbortSignal): Promise<Response> {
@@ -16,23 +19,11 @@ async function get(url: string, signal: AbortSignal): Promise<Response> {
 // The cameras as they were said last, for whoever asks for all of one.
 let lastCameras: Camera[] = [];
 
-async function attemptsAt(url: string, signal: AbortSignal): Promise<Attempt[]> {
-  const json = (await (await get(`${url}/attempts`, signal)).json()) as { attempts?: Attempt[] };
-  return json.attempts ?? [];
-}
-
-// What workers have now. Where attempts are not recorded the cameras say it too, but not since when.
-async function heldNow(url: string, signal: AbortSignal): Promise<HeldCamera[]> {
-  try {
-    const attempts = await attemptsAt(url, signal);
-    return attempts.filter((attempt) => attempt.outcome === 'ATTEMPT_OUTCOME_RUNNING');
-  } catch (error) {
-    if ((error as { status?: number }).status !== 501) throw error;
-  }
-  const json = (await (await get(`${url}/cameras`, signal)).json()) as { cameras?: Camera[] };
-  return (json.cameras ?? [])
-    .filter(({ state, worker }) => state === 'CAMERA_STATE_ASSIGNED' && worker)
-    .map(({ index, sequence, worker }) => ({ camera: index, sequence, worker: worker! }));
+// At most `most` of them, the last one that began at the end; those that run are always among them.
+async function attemptsAt(url: string, most: number, signal: AbortSignal): Promise<Attempt[]> {
+  const response = await get(`${url}/attempts?maxAttempts=${most}`, signal);
+  const json = (await response.json()) as { attempts?: Attempt[] };
+  return (json.attempts ?? []).reverse();
 }
 
 async function answer(request: DataRequest, signal: AbortSignal): Promise<[unknown, Transferable[]]> {
@@ -54,9 +45,9 @@ async function answer(request: DataRequest, signal: AbortSignal): Promise<[unkno
       return [columns, [columns.buffer]];
     }
     case 'attempts':
-      return [await attemptsAt(request.url, signal), []];
+      return [await attemptsAt(request.url, MOST_ATTEMPTS, signal), []];
     case 'held':
-      return [await heldNow(request.url, signal), []];
+      return [(await attemptsAt(request.url, MOST_RUNNING, signal)).filter(runs), []];
     case 'preview': {
       const part = decodePreview(await (await get(request.url, signal)).arrayBuffer());
       return [part, [part.positions.buffer, part.normals.buffer, part.colors.buffer, part.indices.buffer]];

@@ -65,25 +65,23 @@ export interface Part {
   patches: string;
 }
 
-export const ATTEMPT_OUTCOMES = ['RUNNING', 'FINISHED', 'FAILED', 'LOST', 'GIVEN_BACK'] as const;
-export type AttemptOutcome = (typeof ATTEMPT_OUTCOMES)[number];
+// UNSPECIFIED: it runs.
+export const ATTEMPT_ENDINGS = ['UNSPECIFIED', 'FINISHED', 'FAILED', 'OUT_OF_MEMORY', 'LOST', 'GIVEN_BACK'] as const;
+export type AttemptEnding = (typeof ATTEMPT_ENDINGS)[number];
 
 export interface Attempt {
+  reconstructionId: string;
   sequence: number;
   camera: number;
   worker: string;
-  startTime: string;
+  beginTime: string;
   endTime?: string;
-  outcome: `ATTEMPT_OUTCOME_${AttemptOutcome}`;
+  ending: `ATTEMPT_ENDING_${AttemptEnding}`;
   reason?: string;
 }
 
-// A camera that a worker has at this moment.
-export interface HeldCamera {
-  camera: number;
-  sequence: number;
-  worker: string;
-  startTime?: string; // where attempts are recorded
+export function runs(attempt: Attempt): boolean {
+  return attempt.ending === 'ATTEMPT_ENDING_UNSPECIFIED';
 }
 
 export interface LogEntry {
@@ -102,6 +100,7 @@ export interface Worker {
   jobs?: number;
   lastSeen?: string;
   version?: string;
+  running?: Attempt[];
 }
 
 export interface Option {

@@ -1,6 +1,6 @@
 // Who had which camera when: one row a worker, one bar an attempt; what went wrong stands out.
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import type { Attempt, AttemptOutcome } from '../api/types';
+import type { Attempt, AttemptEnding } from '../api/types';
 import { Card, Segmented } from '../components/pieces';
 import { useNow, useWidth } from '../components/hooks';
 import { clock, duration } from '../format';
@@ -16,17 +16,20 @@ const RANGES = [
   ['600', '10 min'],
   ['60', '1 min'],
 ] as const;
-const OUTCOMES: Record<AttemptOutcome, [words: string, color: string]> = {
-  RUNNING: ['under way', '--state-assigned'],
+const ENDINGS: Record<AttemptEnding, [words: string, color: string]> = {
+  UNSPECIFIED: ['under way', '--state-assigned'],
   FINISHED: ['finished', '--state-committed'],
   FAILED: ['failed', '--state-set-aside'],
+  OUT_OF_MEMORY: ['out of memory', '--state-set-aside'],
   LOST: ['lease lost', '--state-lost'],
   GIVEN_BACK: ['given back', '--state-waiting'],
 };
 
+const isTrouble = (ending: AttemptEnding) => ending === 'FAILED' || ending === 'OUT_OF_MEMORY' || ending === 'LOST';
+
 interface Bar {
   attempt: Attempt;
-  outcome: AttemptOutcome;
+  ending: AttemptEnding;
   row: number;
   begin: number; // ms
   end: number; // ms; Infinity while it lasts
@@ -39,9 +42,9 @@ export function layOut(attempts: readonly Attempt[]): { workers: string[]; bars:
   const rows = new Map(workers.map((worker, row) => [worker, row]));
   const bars = attempts.map((attempt) => ({
     attempt,
-    outcome: attempt.outcome.replace('ATTEMPT_OUTCOME_', '') as AttemptOutcome,
+    ending: attempt.ending.replace('ATTEMPT_ENDING_', '') as AttemptEnding,
     row: rows.get(attempt.worker)!,
-    begin: Date.parse(attempt.startTime),
+    begin: Date.parse(attempt.beginTime),
     end: attempt.endTime ? Date.parse(attempt.endTime) : Infinity,
   }));
   return { workers, bars };
@@ -78,8 +81,8 @@ export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; 
     if (width === 0 || canvas.current === null) return;
     const context = prepareCanvas(canvas.current, width, height);
     const colors = Object.fromEntries(
-      Object.entries(OUTCOMES).map(([outcome, [, name]]) => [outcome, cssColor(name)]),
-    ) as Record<AttemptOutcome, string>;
+      Object.entries(ENDINGS).map(([ending, [, name]]) => [ending, cssColor(name)]),
+    ) as Record<AttemptEnding, string>;
     context.font = `12px ${cssColor('--font')}`;
     context.textBaseline = 'middle';
     context.fillStyle = cssColor('--text-2');
@@ -102,10 +105,10 @@ export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; 
       if (bar.end < begin) continue;
       const left = x(Math.max(bar.begin, begin));
       const wide = Math.max(x(bar.end) - left - 0.7, 1.2);
-      const bad = bar.outcome === 'FAILED' || bar.outcome === 'LOST';
-      context.fillStyle = colors[bar.outcome];
+      const bad = isTrouble(bar.ending);
+      context.fillStyle = colors[bar.ending];
       context.fillRect(left, bar.row * ROW_PX + 4, bad ? Math.max(wide, 3) : wide, ROW_PX - 8);
-      if (bar.outcome === 'LOST') {
+      if (bar.ending === 'LOST') {
         // Not by colour alone.
         context.fillStyle = cssColor('--surface');
         context.fillRect(left, bar.row * ROW_PX + ROW_PX / 2 - 1.5, Math.max(wide, 3), 3);
@@ -126,12 +129,10 @@ export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; 
     setHovered(bar === null ? null : { bar, x: event.clientX - bounds.left, y: event.clientY - bounds.top });
   };
   const name = (camera: number) => store.cameras.value?.names[camera] ?? `camera ${camera}`;
-  const troubles = bars.filter((bar) => bar.outcome === 'FAILED' || bar.outcome === 'LOST');
+  const troubles = bars.filter((bar) => isTrouble(bar.ending));
   const words =
     bars.length === 0
-      ? store.attemptsMissing.value
-        ? 'this coordinator keeps no record of them'
-        : 'no camera has been handed out yet'
+      ? 'no camera has been handed out yet'
       : `${bars.length} attempts on ${workers.length} workers, ` +
         (troubles.length === 0 ? 'none failed or lost' : `${troubles.length} failed or lost`);
 
@@ -160,17 +161,17 @@ export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; 
           >
             <strong>{name(hovered.bar.attempt.camera)}</strong>, number {hovered.bar.attempt.sequence}
             <br />
-            {OUTCOMES[hovered.bar.outcome][0]} at {hovered.bar.attempt.worker},{' '}
+            {ENDINGS[hovered.bar.ending][0]} at {hovered.bar.attempt.worker},{' '}
             {duration((Math.min(hovered.bar.end, now) - hovered.bar.begin) / 1000)}
             {hovered.bar.attempt.reason && <div class="muted">{hovered.bar.attempt.reason}</div>}
           </div>
         )}
       </div>
       <ul class="legend">
-        {Object.values(OUTCOMES).map(([outcome, color]) => (
-          <li key={outcome}>
+        {Object.values(ENDINGS).map(([words, color]) => (
+          <li key={words}>
             <span class="dot square" style={{ background: `var(${color})` }} />
-            {outcome}
+            {words}
           </li>
         ))}
       </ul>
@@ -184,21 +185,21 @@ export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; 
                   <th>When</th>
                   <th>Camera</th>
                   <th>Worker</th>
-                  <th>Outcome</th>
+                  <th>Ending</th>
                   <th>Reason</th>
                 </tr>
               </thead>
               <tbody>
-                {troubles.slice(-100).map(({ attempt, outcome }) => (
-                  <tr key={`${attempt.sequence}-${attempt.startTime}`}>
-                    <td>{clock(attempt.startTime)}</td>
+                {troubles.slice(-100).map(({ attempt, ending }) => (
+                  <tr key={`${attempt.sequence}-${attempt.beginTime}`}>
+                    <td>{clock(attempt.beginTime)}</td>
                     <td>
                       <button class="link" onClick={() => onSelect(attempt.camera)}>
                         {name(attempt.camera)}
                       </button>
                     </td>
                     <td>{attempt.worker}</td>
-                    <td>{OUTCOMES[outcome][0]}</td>
+                    <td>{ENDINGS[ending][0]}</td>
                     <td>{attempt.reason}</td>
                   </tr>
                 ))}

@@ -2,16 +2,16 @@
 import { useEffect, useState } from 'preact/hooks';
 import { reconstructionUrl } from '../api/client';
 import { DataService } from '../api/data_service';
-import type { HeldCamera } from '../api/types';
+import type { Attempt } from '../api/types';
 import { duration } from '../format';
 import { firstInOrder } from '../state/order';
 
-export function SlowestStepWords({ held, name, now }: { held: HeldCamera; name?: string; now: number }) {
-  const seconds = held.startTime === undefined ? null : Math.max(0, (now - Date.parse(held.startTime)) / 1000);
+export function SlowestStepWords({ held, name, now }: { held: Attempt; name?: string; now: number }) {
+  const seconds = Math.max(0, (now - Date.parse(held.beginTime)) / 1000);
   return (
     <span>
-      Next commit waits for <strong>{name ?? `camera ${held.camera}`}</strong> at <strong>{held.worker}</strong>
-      {seconds !== null && `, ${duration(seconds)} so far`}
+      Next commit waits for <strong>{name ?? `camera ${held.camera}`}</strong> at <strong>{held.worker}</strong>,{' '}
+      {duration(seconds)} so far
     </span>
   );
 }
@@ -20,7 +20,7 @@ export function SlowestStepWords({ held, name, now }: { held: HeldCamera; name?:
 let shared: DataService | null = null;
 
 export function SlowestStep({ id, now }: { id: string; now: number }) {
-  const [held, setHeld] = useState<HeldCamera | null>(null);
+  const [held, setHeld] = useState<Attempt | null>(null);
   useEffect(() => {
     let closed = false;
     const refresh = async () => {

@@ -1,28 +1,14 @@
-import { useEffect, useState } from 'preact/hooks';
-import { api, reconstructionUrl } from '../api/client';
-import { DataService } from '../api/data_service';
-import { stateOf, type HeldCamera, type Worker } from '../api/types';
+import { useState } from 'preact/hooks';
+import { api } from '../api/client';
+import type { Worker } from '../api/types';
 import { useNow, usePolled } from '../components/hooks';
 import { Confirm, Notice, PageTitle } from '../components/pieces';
 import { ago, bytes, count, duration } from '../format';
 import { linkTo } from '../router';
 
-type Held = HeldCamera & { reconstruction: string };
-
 const POLL_MS = 2500;
 // Longer silence than any heartbeat explains.
 const SILENT_MS = 30_000;
-
-async function heldByWorker(data: DataService): Promise<Map<string, Held[]>> {
-  const held = new Map<string, Held[]>();
-  const running = (await api.listReconstructions()).filter((one) => stateOf(one) === 'RUNNING');
-  for (const { id } of running) {
-    for (const one of await data.ask({ kind: 'held', url: reconstructionUrl(id) })) {
-      held.set(one.worker, [...(held.get(one.worker) ?? []), { ...one, reconstruction: id }]);
-    }
-  }
-  return held;
-}
 
 function WorkerState({ worker, now }: { worker: Worker; now: number }) {
   if (now - Date.parse(worker.lastSeen ?? '') > SILENT_MS) return <span class="badge danger">Silent</span>;
@@ -34,8 +20,9 @@ function WorkerState({ worker, now }: { worker: Worker; now: number }) {
   );
 }
 
-function WorkerCard(props: { worker: Worker; held: Held[]; now: number; onDrain: () => void }) {
-  const { worker, held, now } = props;
+function WorkerCard(props: { worker: Worker; now: number; onDrain: () => void }) {
+  const { worker, now } = props;
+  const running = worker.running ?? [];
   return (
     <li class="card worker">
       <div class="worker-head">
@@ -64,16 +51,14 @@ function WorkerCard(props: { worker: Worker; held: Held[]; now: number; onDrain:
           <dd>{ago(worker.lastSeen, now)}</dd>
         </div>
       </dl>
-      {held.length > 0 && (
+      {running.length > 0 && (
         <ul class="held small" aria-label={`What ${worker.id} does now`}>
-          {held.map((one) => (
-            <li key={`${one.reconstruction}/${one.sequence}`}>
+          {running.map((one) => (
+            <li key={`${one.reconstructionId}/${one.sequence}`}>
               <span>
-                camera {one.camera} of <a href={linkTo.reconstruction(one.reconstruction)}>{one.reconstruction}</a>
+                camera {one.camera} of <a href={linkTo.reconstruction(one.reconstructionId)}>{one.reconstructionId}</a>
               </span>
-              {one.startTime !== undefined && (
-                <span class="muted">{duration(Math.max(0, (now - Date.parse(one.startTime)) / 1000))}</span>
-              )}
+              <span class="muted">{duration(Math.max(0, (now - Date.parse(one.beginTime)) / 1000))}</span>
             </li>
           ))}
         </ul>
@@ -83,14 +68,9 @@ function WorkerCard(props: { worker: Worker; held: Held[]; now: number; onDrain:
 }
 
 export default function WorkersPage() {
-  const [data] = useState(() => new DataService());
-  useEffect(() => () => data.close(), [data]);
   const [draining, setDraining] = useState<Worker | null>(null);
   const [failure, setFailure] = useState('');
-  const { value, error, refresh } = usePolled(async () => {
-    const [workers, held] = await Promise.all([api.workers(), heldByWorker(data)]);
-    return { workers, held };
-  }, POLL_MS);
+  const { value, error, refresh } = usePolled(() => api.workers(), POLL_MS);
   const now = useNow();
   const answered = async (yes: boolean) => {
     setDraining(null);
@@ -103,7 +83,7 @@ export default function WorkersPage() {
     }
     refresh();
   };
-  const workers = value?.workers ?? [];
+  const workers = value ?? [];
   const cores = workers.reduce((sum, worker) => sum + (worker.cores ?? 0), 0);
   const busy = workers.reduce((sum, worker) => sum + (worker.jobs ?? 0), 0);
   return (
@@ -129,13 +109,7 @@ export default function WorkersPage() {
       )}
       <ul class="worker-grid">
         {workers.map((worker) => (
-          <WorkerCard
-            key={worker.id}
-            worker={worker}
-            held={value!.held.get(worker.id) ?? []}
-            now={now}
-            onDrain={() => setDraining(worker)}
-          />
+          <WorkerCard key={worker.id} worker={worker} now={now} onDrain={() => setDraining(worker)} />
         ))}
       </ul>
       {draining !== null && (

@@ -1,8 +1,8 @@
-import type { HeldCamera } from '../api/types';
+import type { Attempt } from '../api/types';
 
 // Cameras are committed in one order: the earliest of those in flight is the one that everything waits for.
-export function firstInOrder(held: readonly HeldCamera[]): HeldCamera | null {
-  let first: HeldCamera | null = null;
+export function firstInOrder(held: readonly Attempt[]): Attempt | null {
+  let first: Attempt | null = null;
   for (const one of held) if (first === null || one.sequence < first.sequence) first = one;
   return first;
 }

@@ -1,16 +1,16 @@
 // Everything the page knows about one reconstruction. Events say what is new; what is large is asked for again when an
 // event has made it old and somebody looks at it.
 import { batch, signal } from '@preact/signals';
-import { stateOfCamera, type CameraTable } from '../api/camera_table';
-import { api, ApiError, reconstructionUrl, tokenWanted } from '../api/client';
+import type { CameraTable } from '../api/camera_table';
+import { api, reconstructionUrl, tokenWanted } from '../api/client';
 import { DataService } from '../api/data_service';
 import { EventStream, type ConnectionState } from '../api/event_stream';
 import {
   isOver,
+  runs,
   stateOf,
   type Attempt,
   type Camera,
-  type HeldCamera,
   type LogEntry,
   type Part,
   type Reconstruction,
@@ -28,7 +28,6 @@ export class ReconstructionStore {
   readonly cameras = signal<CameraTable | null>(null);
   readonly parts = signal<readonly Part[]>([]); // in sequence
   readonly attempts = signal<readonly Attempt[]>([]);
-  readonly attemptsMissing = signal(false); // this coordinator does not record them
   readonly incidence = signal<Int32Array | null>(null);
   readonly log = signal<readonly LogEntry[]>([]);
   readonly samples = signal<readonly Sample[]>([]);
@@ -48,13 +47,7 @@ export class ReconstructionStore {
         this.cameras.value = await this.data.ask({ kind: 'cameras', url: at('/cameras') });
       }, 2000),
       attempts: new Refresher(async () => {
-        try {
-          this.attempts.value = await this.data.ask({ kind: 'attempts', url: at('') });
-        } catch (error) {
-          if (!(error instanceof ApiError) || error.status !== 501) throw error;
-          this.attemptsMissing.value = true;
-          this.watched.attempts = false;
-        }
+        this.attempts.value = await this.data.ask({ kind: 'attempts', url: at('') });
       }, 3000),
       incidence: new Refresher(async () => {
         this.incidence.value = await this.data.ask({ kind: 'incidence', url: at('/incidence') });
@@ -97,16 +90,8 @@ export class ReconstructionStore {
   }
 
   // The camera that the next commit waits for.
-  firstHeld(): HeldCamera | null {
-    const running = this.attempts.value.filter((attempt) => attempt.outcome === 'ATTEMPT_OUTCOME_RUNNING');
-    if (running.length > 0 || !this.attemptsMissing.value) return firstInOrder(running);
-    const table = this.cameras.value;
-    const held: HeldCamera[] = [];
-    for (let i = 0; table !== null && i < table.count; ++i) {
-      if (stateOfCamera(table, i) !== 'ASSIGNED' || table.workers[i] === '') continue;
-      held.push({ camera: i, sequence: table.sequences[i]!, worker: table.workers[i]! });
-    }
-    return firstInOrder(held);
+  firstHeld(): Attempt | null {
+    return firstInOrder(this.attempts.value.filter(runs));
   }
 
   camera(index: number): Promise<Camera | null> {

@@ -119,7 +119,7 @@ export class FakeApi {
     if (path === '/v1/workers') {
       const lastSeen = new Date(Date.now() - 1200).toISOString();
       return json(response, {
-        workers: this.workers.map((worker) => ({ ...worker, lastSeen })),
+        workers: this.workers.map((worker) => ({ ...worker, lastSeen, running: this.runningAt(worker.id) })),
       });
     }
     if (route[0] === 'workers' && route[1].endsWith(':drain')) {
@@ -134,6 +134,12 @@ export class FakeApi {
     const simulation = this.simulations.get(id);
     if (simulation === undefined) return problem(response, 404, `id: "${id}": no such reconstruction`);
     return this.one(response, request, url, simulation, action ?? '', route.slice(2));
+  }
+
+  runningAt(worker) {
+    return [...this.simulations.values()].flatMap(({ attempts }) =>
+      attempts.filter((attempt) => attempt.worker === worker && attempt.ending === 'ATTEMPT_ENDING_UNSPECIFIED'),
+    );
   }
 
   async all(request, response) {
@@ -223,7 +229,9 @@ export class FakeApi {
       case 'incidence':
         return json(response, simulation.incidenceJson());
       case 'attempts':
-        return json(response, { attempts: simulation.attempts });
+        return json(response, {
+          attempts: simulation.attempts.slice(-Number(url.searchParams.get('maxAttempts') || 1000)).reverse(),
+        });
       case 'log':
         return json(response, { entries: simulation.log });
       case 'parts': {

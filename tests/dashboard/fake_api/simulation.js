@@ -122,15 +122,16 @@ export class Simulation {
       camera: camera.index,
       epoch: String(camera.attempts),
       worker,
-      startTime: new Date(this.now).toISOString(),
-      outcome: 'ATTEMPT_OUTCOME_RUNNING',
+      reconstructionId: this.id,
+      beginTime: new Date(this.now).toISOString(),
+      ending: 'ATTEMPT_ENDING_UNSPECIFIED',
     };
     this.attempts.push(camera.attempt);
   }
 
-  close(attempt, outcome, reason) {
+  close(attempt, ending, reason) {
     Object.assign(attempt, {
-      outcome: `ATTEMPT_OUTCOME_${outcome}`,
+      ending: `ATTEMPT_ENDING_${ending}`,
       endTime: new Date(this.now).toISOString(),
     });
     if (reason) attempt.reason = reason;
@@ -141,7 +142,7 @@ export class Simulation {
     if (luck < 0.012) {
       const lost = luck < 0.006;
       const reason = lost ? 'the lease ran out' : 'out of memory: 5120 MiB wanted, 4096 MiB allowed';
-      this.close(camera.attempt, lost ? 'LOST' : 'FAILED', reason);
+      this.close(camera.attempt, lost ? 'LOST' : 'OUT_OF_MEMORY', reason);
       this.say(this.now, 'warning', `${lost ? 'Lease lost' : 'Failed'}: ${reason}; tried again`, {
         camera: camera.index,
         worker: camera.worker,
