@@ -436,8 +436,7 @@ absl::StatusOr<v1::Part> ReconstructionLogic::GetPart(const std::string& id, Seq
       return part;
     }
   }
-  return absl::NotFoundError(
-      absl::StrCat("sequence is ", sequence, ", expected that of a part of reconstruction ", id));
+  return absl::NotFoundError(absl::StrCat("sequence is ", sequence, ", which is no part of reconstruction ", id));
 }
 
 absl::StatusOr<std::string> ReconstructionLogic::MeshPath(const std::string& id) const {
