@@ -213,12 +213,12 @@ TEST_F(FaultsTest, UploadedPhotographsThatRotAreNamed) {
               testing::ContainsRegex("[0-9]+\\.png is damaged or lost"));
 }
 
-// A file system of a few megabytes.
+// A file system that is full soon.
 class SmallDisk {
  public:
   explicit SmallDisk(std::string path) : path_(std::move(path)) {
     fs::create_directories(path_);
-    mounted_ = ::mount("tmpfs", path_.c_str(), "tmpfs", 0, "size=24m") == 0;
+    mounted_ = ::mount("tmpfs", path_.c_str(), "tmpfs", 0, "size=128m") == 0;
   }
   ~SmallDisk() {
     if (mounted_) ::umount2(path_.c_str(), MNT_DETACH);
