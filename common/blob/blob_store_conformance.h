@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/digest.h"
+#include "common/base/files.h"
 #include "common/blob/blob_store.h"
 
 namespace meshwright {
