@@ -121,5 +121,11 @@ test('no task takes longer than 200 ms with 5,000 cameras and 20 million faces',
   assert.ok(numbers.faces > 15e6);
   const longest = (measure) => Math.max(...tasks.map((task) => task[measure]));
   assert.ok(longest('processorMs') < LONGEST_TASK_MS);
-  if (!busy) assert.ok(longest('ms') < LONGEST_TASK_MS);
+  // Where the processor draws, the page's thread waits for the drawing process, which needs the same cores.
+  const software = await page.evaluate(() => {
+    const gl = document.createElement('canvas').getContext('webgl2');
+    const names = gl?.getExtension('WEBGL_debug_renderer_info');
+    return !names || /swiftshader|llvmpipe|software/i.test(gl.getParameter(names.UNMASKED_RENDERER_WEBGL));
+  });
+  if (!busy && !software) assert.ok(longest('ms') < LONGEST_TASK_MS);
 });
