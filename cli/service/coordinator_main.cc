@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cstdio>
+#include <optional>
 #include <thread>
 
-#include <absl/strings/str_cat.h>
-
 #include "cli/console.h"
+#include "cli/service/parse_program.h"
 #include "cli/service/program_options.h"
 
 namespace {
@@ -31,17 +31,10 @@ int main(int argc, char** argv) {
   BlockStopSignals();
   CLI::App program("Meshwright's coordinator: decides which camera is processed next, accepts surfaces, makes meshes.",
                    "meshwright-coordinator");
-  program.set_version_flag("--version", absl::StrCat("meshwright-coordinator ", MW_VERSION));
   CoordinatorSettings settings;
   settings.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   AddCoordinatorOptions(program, settings);
-  AddConfigOption(program);
-  try {
-    ParseWithEnvironment(program, argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return program.exit(error);
-    return FailWrongUse(absl::StrCat(error.what(), " (--help shows what is expected)"));
-  }
+  if (const std::optional<int> over = ParseProgram(program, argc, argv)) return *over;
   if (settings.data_folder.empty()) return FailWrongUse("--data is required (--help shows what is expected)");
   return Serve(settings);
 }

@@ -1,11 +1,12 @@
 #include <algorithm>
 #include <cstdio>
+#include <optional>
 #include <thread>
 
-#include <absl/strings/str_cat.h>
 #include <unistd.h>
 
 #include "cli/console.h"
+#include "cli/service/parse_program.h"
 #include "cli/service/program_options.h"
 #include "cli/service/worker_keeper.h"
 
@@ -35,17 +36,10 @@ int main(int argc, char** argv) {
   KeepMemoryLow();
   BlockStopSignals();
   CLI::App program("Meshwright's worker: processes reference cameras for a coordinator.", "meshwright-worker");
-  program.set_version_flag("--version", absl::StrCat("meshwright-worker ", MW_VERSION));
   WorkerSettings settings;
   settings.cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   AddWorkerOptions(program, settings);
-  AddConfigOption(program);
-  try {
-    ParseWithEnvironment(program, argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return program.exit(error);
-    return FailWrongUse(absl::StrCat(error.what(), " (--help shows what is expected)"));
-  }
+  if (const std::optional<int> over = ParseProgram(program, argc, argv)) return *over;
   if (settings.id.empty()) settings.id = DefaultWorkerId();
   return KeepAlive([&](bool ran_out_of_memory) {
     settings.ran_out_of_memory = ran_out_of_memory;
