@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <absl/status/statusor.h>
 
-#include "cli/console.h"
+#include "common/program/console.h"
 #include "common/scene/scene.h"
 
 namespace meshwright {

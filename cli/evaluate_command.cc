@@ -1,11 +1,12 @@
 #include <memory>
 #include <vector>
 
+#include "tools/evaluation/evaluation.h"
+
 #include "cli/commands.h"
 #include "common/base/bad_input.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
-#include "common/evaluation/evaluation.h"
 #include "common/mesh/ply.h"
 #include "common/scene/view.h"
 

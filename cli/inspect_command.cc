@@ -4,9 +4,10 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "pipeline/inspection/inspection.h"
+#include "pipeline/options/reconstruction_options.h"
+
 #include "cli/commands.h"
-#include "cli/local/inspection.h"
-#include "cli/local/reconstruction_options.h"
 #include "common/base/bad_input.h"
 #include "common/base/thread_pool.h"
 

@@ -5,8 +5,8 @@
 #include <absl/strings/str_cat.h>
 
 #include "cli/commands.h"
-#include "cli/console.h"
-#include "cli/service/program_options.h"
+#include "common/program/console.h"
+#include "common/program/program_options.h"
 
 int main(int argc, char** argv) {
   using namespace meshwright;

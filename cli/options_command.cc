@@ -5,8 +5,9 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 
+#include "pipeline/options/reconstruction_options.h"
+
 #include "cli/commands.h"
-#include "cli/local/reconstruction_options.h"
 
 namespace meshwright {
 namespace {

@@ -6,7 +6,7 @@
 #include <absl/strings/str_format.h>
 #include <unistd.h>
 
-#include "cli/console.h"
+#include "common/program/console.h"
 
 namespace meshwright {
 namespace {

@@ -7,7 +7,8 @@
 
 #include <absl/time/time.h>
 
-#include "cli/local/local_reconstruction.h"
+#include "pipeline/local/local_reconstruction.h"
+
 #include "common/base/clock.h"
 
 namespace meshwright {

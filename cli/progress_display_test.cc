@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/console.h"
+#include "common/program/console.h"
 
 namespace meshwright {
 namespace {

@@ -7,9 +7,10 @@
 #include <absl/strings/str_cat.h>
 #include <unistd.h>
 
+#include "pipeline/local/local_reconstruction.h"
+#include "tools/loss_accounting/loss_accounting.h"
+
 #include "cli/commands.h"
-#include "cli/local/local_reconstruction.h"
-#include "cli/local/loss_accounting.h"
 #include "cli/progress_display.h"
 #include "common/base/bad_input.h"
 #include "common/base/clock.h"

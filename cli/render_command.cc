@@ -3,13 +3,14 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "tools/rendering/mesh_renderer.h"
+
 #include "cli/commands.h"
 #include "common/base/bad_input.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
 #include "common/image/encode.h"
 #include "common/mesh/ply.h"
-#include "common/rendering/mesh_renderer.h"
 #include "common/scene/view.h"
 
 namespace meshwright {

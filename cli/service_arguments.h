@@ -5,8 +5,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/console.h"
-#include "cli/service/service_client.h"
+#include "clients/cpp/service_client.h"
+
+#include "common/program/console.h"
 
 namespace meshwright {
 

@@ -34,7 +34,7 @@ void PrintReconstruction(const v1::Reconstruction& reconstruction) {
     std::printf(" cameras %d/%d, %d with workers", progress.cameras_committed(), progress.cameras_total(),
                 progress.jobs_leased());
   }
-  if (progress.cameras_set_aside() > 0) std::printf(", %d set aside", progress.cameras_set_aside());
+  if (progress.cameras_skipped() > 0) std::printf(", %d skipped", progress.cameras_skipped());
   std::printf("%s%s\n", reconstruction.failure().empty() ? "" : " ", reconstruction.failure().c_str());
 }
 
@@ -126,7 +126,7 @@ Json ToJson(const v1::Reconstruction& reconstruction) {
   if (!reconstruction.failure().empty()) json["failure"] = reconstruction.failure();
   json["cameras"] = {{"total", progress.cameras_total()},
                      {"committed", progress.cameras_committed()},
-                     {"set_aside", progress.cameras_set_aside()},
+                     {"skipped", progress.cameras_skipped()},
                      {"with_workers", progress.jobs_leased()}};
   if (reconstruction.state() == v1::RECONSTRUCTION_STATE_DONE) {
     json["mesh"] = {{"vertices", progress.vertices()},

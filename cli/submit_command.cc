@@ -10,8 +10,9 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include "pipeline/options/reconstruction_options.h"
+
 #include "cli/commands.h"
-#include "cli/local/reconstruction_options.h"
 #include "cli/service_arguments.h"
 #include "common/base/status_macros.h"
 

@@ -2,10 +2,11 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "tools/synthetic/synthetic_scene.h"
+
 #include "cli/commands.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
-#include "common/synthetic/synthetic_scene.h"
 
 namespace meshwright {
 namespace {

@@ -8,7 +8,9 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
-#include "cli/service/program_options.h"
+#include "common/program/program_options.h"
+#include "coordinator/main/coordinator_options.h"
+#include "worker/main/worker_program.h"
 
 namespace meshwright {
 namespace {

@@ -171,9 +171,9 @@ TEST(S3ClientTest, BusyServersAndBrokenConnectionsAreTriedAgain) {
   EXPECT_EQ(server.requests(), 4);
 }
 
-TEST(S3ClientTest, PatienceEnds) {
+TEST(S3ClientTest, TheRetryDeadlineEnds) {
   S3Options options = ScriptedServer({}).options();  // nobody listens there any more
-  options.patience = absl::Milliseconds(300);
+  options.retry_deadline = absl::Milliseconds(300);
   S3Client client(options);
   const absl::Status status = client.Send({.method = "GET", .key = "k"}).status();
   EXPECT_TRUE(absl::IsUnavailable(status)) << status;

@@ -49,7 +49,7 @@ size_t ReadHeader(const char* data, size_t size, size_t count, void* etag) {
 }
 
 // Errors in the request's own form; all others come from the network and may pass.
-bool IsHopeless(CURLcode code) {
+bool IsPermanent(CURLcode code) {
   return code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL || code == CURLE_PEER_FAILED_VERIFICATION ||
          code == CURLE_OUT_OF_MEMORY || code == CURLE_BAD_FUNCTION_ARGUMENT;
 }
@@ -139,7 +139,7 @@ std::string S3Client::UrlOf(const std::string& key) const {
 
 absl::StatusOr<S3Response> S3Client::Send(const S3Request& request) {
   void* const handle = TakeHandle();
-  const absl::Time deadline = absl::Now() + options_.patience;
+  const absl::Time deadline = absl::Now() + options_.retry_deadline;
   absl::Duration pause = kFirstPause;
   while (true) {
     bool retry = false;
@@ -194,7 +194,7 @@ absl::StatusOr<S3Response> S3Client::SendOnce(void* handle, const S3Request& req
   const CURLcode code = curl_easy_perform(handle);
   curl_slist_free_all(headers);
   if (code != CURLE_OK) {
-    *retry = !IsHopeless(code);
+    *retry = !IsPermanent(code);
     return absl::UnavailableError(absl::StrCat(request.method, " ", url, ": ", curl_easy_strerror(code)));
   }
   long status = 0;

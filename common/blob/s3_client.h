@@ -25,7 +25,7 @@ struct S3Options {
   // Objects larger than this are uploaded in parts of this size, bytes; at least 5 MiB (a limit of S3).
   int64_t part_bytes = int64_t{64} << 20;
   // How long a request is repeated after errors of the network and of the server (5xx, 429).
-  absl::Duration patience = absl::Seconds(30);
+  absl::Duration retry_deadline = absl::Seconds(30);
 
   absl::Status Validate() const;
 };
@@ -62,7 +62,8 @@ class S3Client {
   std::string UrlOf(const std::string& key) const;
 
   // Answers 2xx; everything else is an error that names the address: NotFound, PermissionDenied, FailedPrecondition (no
-  // such bucket), ResourceExhausted (storage full), Unavailable (still failing when patience ends), else Internal.
+  // such bucket), ResourceExhausted (storage full), Unavailable (still failing when retry_deadline ends), else
+  // Internal.
   absl::StatusOr<S3Response> Send(const S3Request& request);
 
  private:

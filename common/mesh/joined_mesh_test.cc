@@ -16,11 +16,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "tools/raycast/mesh_ray_caster.h"
+
 #include "common/base/files.h"
 #include "common/mesh/disjoint_sets.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/surface_mesh.h"
-#include "common/raycast/mesh_ray_caster.h"
 #include "common/surface/random_surface_testing.h"
 
 namespace meshwright {

@@ -8,8 +8,9 @@
 
 #include <gtest/gtest.h>
 
+#include "tools/raycast/mesh_ray_caster.h"
+
 #include "common/mesh/triangle_mesh.h"
-#include "common/raycast/mesh_ray_caster.h"
 
 namespace meshwright {
 namespace {

@@ -13,7 +13,7 @@ namespace {
 constexpr char kMetricsType[] = "text/plain; version=0.0.4; charset=utf-8";
 constexpr char kText[] = "text/plain; charset=utf-8";
 constexpr size_t kThreads = 2;  // scrapers and probes are few, and a slow one must not keep the others waiting
-constexpr int kPatienceSeconds = 5;
+constexpr int kIdleTimeoutSeconds = 5;
 constexpr size_t kMaxRequestBytes = 1024;
 
 class HttpMetricsServer final : public MetricsServer {
@@ -21,8 +21,8 @@ class HttpMetricsServer final : public MetricsServer {
   HttpMetricsServer(const Metrics& metrics, std::function<absl::Status()> ready)
       : metrics_(metrics), ready_(std::move(ready)) {
     server_.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
-    server_.set_read_timeout(kPatienceSeconds);
-    server_.set_write_timeout(kPatienceSeconds);
+    server_.set_read_timeout(kIdleTimeoutSeconds);
+    server_.set_write_timeout(kIdleTimeoutSeconds);
     server_.set_keep_alive_max_count(1);
     server_.set_payload_max_length(kMaxRequestBytes);
     server_.Get("/metrics", [this](const httplib::Request&, httplib::Response& response) {

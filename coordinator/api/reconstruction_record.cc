@@ -5,7 +5,7 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "coordinator/api/proto_times.h"
+#include "coordinator/dispatch/proto_times.h"
 
 namespace meshwright {
 namespace {
@@ -15,7 +15,7 @@ constexpr std::pair<const char*, v1::AttemptEnding> kEndings[] = {{"finished", v
                                                                   {"failed", v1::ATTEMPT_ENDING_FAILED},
                                                                   {"out_of_memory", v1::ATTEMPT_ENDING_OUT_OF_MEMORY},
                                                                   {"lost", v1::ATTEMPT_ENDING_LOST},
-                                                                  {"given_back", v1::ATTEMPT_ENDING_GIVEN_BACK}};
+                                                                  {"released", v1::ATTEMPT_ENDING_RELEASED}};
 
 }  // namespace
 
@@ -56,7 +56,7 @@ v1::Reconstruction ToProto(const Reconstruction& stored) {
   v1::Progress& progress = *reconstruction.mutable_progress();
   progress.set_cameras_total(static_cast<int32_t>(stored.progress.cameras_total));
   progress.set_cameras_committed(static_cast<int32_t>(stored.progress.cameras_committed));
-  progress.set_cameras_set_aside(static_cast<int32_t>(stored.progress.cameras_set_aside));
+  progress.set_cameras_skipped(static_cast<int32_t>(stored.progress.cameras_skipped));
   progress.set_cameras_in_flight(static_cast<int32_t>(stored.progress.cameras_in_flight));
   progress.set_patches_filtered(stored.progress.patches_filtered);
   progress.set_patches_accepted(stored.progress.patches_accepted);

@@ -9,6 +9,7 @@
 #include "common/base/status_macros.h"
 #include "common/job/job_spec_codec.h"
 #include "common/surface/codec.h"
+#include "coordinator/incidence/target_selection.h"
 
 namespace meshwright {
 namespace {
@@ -40,20 +41,9 @@ void KeepLargest(int count, std::vector<Surface>& surfaces) {
 
 }  // namespace
 
-absl::Status ConductorOptions::Validate() const {
-  MW_RETURN_IF_ERROR(pairs.Validate());
-  MW_RETURN_IF_ERROR(overlap.Validate());
-  MW_RETURN_IF_ERROR(targets.Validate());
-  MW_RETURN_IF_ERROR(acceptance.Validate());
-  if (max_surfaces < 1) {
-    return absl::InvalidArgumentError(absl::StrCat("max_surfaces is ", max_surfaces, ", expected >= 1"));
-  }
-  return ScheduleOptions{.window = window, .max_overlap_in_flight = acceptance.k_a}.Validate();
-}
-
 Conductor::Conductor(std::string reconstruction_id, const std::vector<Camera>& cameras, FeasiblePairs pairs,
                      OverlapGraph overlaps, const ConductorOptions& options, JobStore* store, BlobStore* blobs,
-                     const Clock* clock, ThreadPool* pool, ConductorOffice office)
+                     const Clock* clock, ThreadPool* pool, ConductorLeaseTerms terms)
     : reconstruction_id_(std::move(reconstruction_id)),
       cameras_(CameraGeometries(cameras)),
       probes_(std::move(pairs.probes)),
@@ -65,7 +55,7 @@ Conductor::Conductor(std::string reconstruction_id, const std::vector<Camera>& c
       blobs_(blobs),
       clock_(clock),
       pool_(pool),
-      office_(std::move(office)),
+      terms_(std::move(terms)),
       schedule_(std::move(pairs.matrix), overlaps_,
                 ScheduleOptions{.window = options.window, .max_overlap_in_flight = options.acceptance.k_a}) {}
 
@@ -74,14 +64,14 @@ absl::StatusOr<std::unique_ptr<Conductor>> Conductor::Open(const std::string& re
                                                            const std::vector<SparsePoint>& points,
                                                            const ConductorOptions& options, JobStore* store,
                                                            BlobStore* blobs, const Clock* clock, ThreadPool* pool,
-                                                           ConductorOffice office) {
+                                                           ConductorLeaseTerms terms) {
   MW_RETURN_IF_ERROR(options.Validate());
   MW_RETURN_IF_ERROR(store->GetReconstruction(reconstruction_id).status());
   MW_ASSIGN_OR_RETURN(FeasiblePairs pairs, FindFeasiblePairs(cameras, points, options.pairs, *pool));
   OverlapGraph overlaps = FindOverlaps(CameraGeometries(cameras), pairs.probes, pairs.matrix, options.overlap, *pool);
   auto conductor =
       std::unique_ptr<Conductor>(new Conductor(reconstruction_id, cameras, std::move(pairs), std::move(overlaps),
-                                               options, store, blobs, clock, pool, std::move(office)));
+                                               options, store, blobs, clock, pool, std::move(terms)));
   MW_ASSIGN_OR_RETURN(const std::vector<CameraJob> jobs, store->ListCameraJobs(reconstruction_id));
   MW_ASSIGN_OR_RETURN(const std::vector<Commit> commits, store->ListCommits(reconstruction_id));
   const std::lock_guard<std::mutex> lock(conductor->mutex_);
@@ -101,7 +91,7 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
     const bool is_made_again = !jobs[i].expected_digest.empty();
     const Outcome outcome = {.filtered_digest = is_made_again ? jobs[i].expected_digest : jobs[i].filtered_digest,
                              .weak_targets = jobs[i].weak_targets,
-                             .set_aside = jobs[i].state == CameraJobState::kSetAside};
+                             .skipped = jobs[i].state == CameraJobState::kSkipped};
     MW_RETURN_IF_ERROR(schedule_.Commit(RecordFor(schedule_.in_flight().front(), outcome)));
     Remember(commit, outcome);
   }
@@ -116,7 +106,7 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
       return absl::DataLossError(
           absl::StrCat(Name(job.sequence), " (camera ", job.camera, ") is not what this scene and these options give"));
     }
-    if (job.state == CameraJobState::kAssigned && office_.epoch > 0) continue;  // it is in the store, or at a worker
+    if (job.state == CameraJobState::kAssigned && terms_.epoch > 0) continue;  // it is in the store, or at a worker
     if (job.state == CameraJobState::kAssigned) {
       MW_ASSIGN_OR_RETURN(const int64_t epoch,
                           store_->ReassignCameraJob(reconstruction_id_, job.sequence, clock_->Now()));
@@ -124,7 +114,7 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
     } else {
       finished_[job.sequence] = {.filtered_digest = job.filtered_digest,
                                  .weak_targets = job.weak_targets,
-                                 .set_aside = job.state == CameraJobState::kSetAside,
+                                 .skipped = job.state == CameraJobState::kSkipped,
                                  .epoch = job.epoch};
     }
   }
@@ -133,7 +123,7 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
 
 void Conductor::Assign(const Assignment& assignment) {
   CameraJobSpec spec = SpecFor(assignment, 1);
-  const std::vector<int64_t> bytes = office_.job_bytes ? office_.job_bytes(spec) : std::vector<int64_t>();
+  const std::vector<int64_t> bytes = terms_.job_bytes ? terms_.job_bytes(spec) : std::vector<int64_t>();
   unwritten_assignments_.push_back(
       {.sequence = spec.sequence,
        .camera = spec.camera,
@@ -141,7 +131,7 @@ void Conductor::Assign(const Assignment& assignment) {
        .memory_bytes = bytes.empty() ? 0 : bytes.front(),
        .neighbours = spec.neighbours,
        .spec = EncodeJobSpec({.targets = spec.targets, .accepted = spec.accepted, .memory_bytes = bytes})});
-  if (office_.epoch == 0) ready_.push_back(std::move(spec));
+  if (terms_.epoch == 0) ready_.push_back(std::move(spec));
 }
 
 absl::Status Conductor::Flush() {
@@ -149,12 +139,12 @@ absl::Status Conductor::Flush() {
   const Progress now = CurrentProgress();
   const StoredProgress stored = {.cameras_total = now.cameras_total,
                                  .cameras_committed = now.cameras_committed,
-                                 .cameras_set_aside = now.cameras_set_aside,
+                                 .cameras_skipped = now.cameras_skipped,
                                  .cameras_in_flight = now.cameras_in_flight,
                                  .patches_filtered = now.patches_filtered,
                                  .patches_accepted = now.patches_accepted};
   MW_RETURN_IF_ERROR(store_->Advance(reconstruction_id_, unwritten_commits_, unwritten_assignments_, stored,
-                                     clock_->Now(), office_.epoch));
+                                     clock_->Now(), terms_.epoch));
   unwritten_commits_.clear();
   unwritten_assignments_.clear();
   return absl::OkStatus();
@@ -182,16 +172,16 @@ absl::Status Conductor::Complete(SequenceNumber sequence, int64_t epoch, const s
   return CommitWhatIsNext();
 }
 
-absl::Status Conductor::SetAside(SequenceNumber sequence, int64_t epoch, const std::string& reason) {
+absl::Status Conductor::Skip(SequenceNumber sequence, int64_t epoch, const std::string& reason) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (sequence <= schedule_.commits()) return absl::OkStatus();
   MW_RETURN_IF_ERROR(FindInFlight(sequence).status());
-  MW_RETURN_IF_ERROR(store_->SetCameraJobAside(reconstruction_id_, sequence, epoch, reason, clock_->Now()));
-  finished_[sequence] = {.set_aside = true, .epoch = epoch};
+  MW_RETURN_IF_ERROR(store_->SkipCameraJob(reconstruction_id_, sequence, epoch, reason, clock_->Now()));
+  finished_[sequence] = {.skipped = true, .epoch = epoch};
   return CommitWhatIsNext();
 }
 
-absl::StatusOr<bool> Conductor::Absorb(int max_failures) {
+absl::StatusOr<bool> Conductor::IngestResults(int max_failures) {
   const std::lock_guard<std::mutex> lock(mutex_);
   damaged_blob_.clear();
   MW_ASSIGN_OR_RETURN(const std::vector<JobResult> results,
@@ -202,7 +192,7 @@ absl::StatusOr<bool> Conductor::Absorb(int max_failures) {
     MW_ASSIGN_OR_RETURN(const Assignment* const assignment, FindInFlight(result.sequence));
     const absl::Status valid = CheckWeakTargets(*assignment, result.weak_targets);
     bool durable = true;
-    if (valid.ok() && !result.set_aside) {
+    if (valid.ok() && !result.skipped) {
       MW_ASSIGN_OR_RETURN(durable, blobs_->Has(result.filtered_digest));
     }
     if (!valid.ok() || !durable) {
@@ -213,7 +203,7 @@ absl::StatusOr<bool> Conductor::Absorb(int max_failures) {
     }
     finished_[result.sequence] = {.filtered_digest = result.filtered_digest,
                                   .weak_targets = result.weak_targets,
-                                  .set_aside = result.set_aside,
+                                  .skipped = result.skipped,
                                   .epoch = result.epoch};
   }
   const SequenceNumber in_flight_before = schedule_.commits() + static_cast<int>(schedule_.in_flight().size());
@@ -232,10 +222,10 @@ absl::StatusOr<bool> Conductor::Absorb(int max_failures) {
 
 absl::Status Conductor::Reject(SequenceNumber sequence, int64_t epoch, const std::string& reason, int max_failures) {
   MW_RETURN_IF_ERROR(
-      store_->ReopenCameraJob(reconstruction_id_, sequence, epoch, "", reason, clock_->Now(), office_.epoch));
+      store_->ReopenCameraJob(reconstruction_id_, sequence, epoch, "", reason, clock_->Now(), terms_.epoch));
   MW_ASSIGN_OR_RETURN(const CameraJob job, store_->GetCameraJob(reconstruction_id_, sequence));
   if (job.failed_attempts < max_failures) return absl::OkStatus();
-  return store_->SetCameraJobAside(reconstruction_id_, sequence, job.epoch, reason, clock_->Now());
+  return store_->SkipCameraJob(reconstruction_id_, sequence, job.epoch, reason, clock_->Now());
 }
 
 std::string Conductor::damaged_blob() const {
@@ -284,7 +274,7 @@ absl::Status Conductor::CommitWhatIsNext() {
     if (found == finished_.end()) break;
     const Outcome& outcome = found->second;
     Commit commit = {.sequence = assignment.sequence, .camera = assignment.camera};
-    if (!outcome.set_aside) {
+    if (!outcome.skipped) {
       absl::StatusOr<Commit> accepted = Accept(assignment.sequence, assignment.camera, outcome.filtered_digest);
       status = accepted.status();
       if (!status.ok()) break;
@@ -301,8 +291,8 @@ absl::Status Conductor::CommitWhatIsNext() {
   }
   MW_RETURN_IF_ERROR(Flush());
   MW_RETURN_IF_ERROR(status);
-  // With an office there is more to come than cameras: the mesh.
-  if (!schedule_.finished() || office_.epoch > 0) return absl::OkStatus();
+  // With an terms there is more to come than cameras: the mesh.
+  if (!schedule_.finished() || terms_.epoch > 0) return absl::OkStatus();
   return store_->SetReconstructionState(reconstruction_id_, ReconstructionState::kDone, clock_->Now());
 }
 
@@ -312,7 +302,7 @@ absl::StatusOr<std::shared_ptr<const SparseSurface>> Conductor::LoadSurface(cons
   if (absl::IsDataLoss(bytes.status()) || absl::IsNotFound(bytes.status())) damaged_blob_ = digest;
   MW_RETURN_IF_ERROR(bytes.status());
   absl::StatusOr<SparseSurface> surface = DecodeSparseSurface(*bytes);
-  const bool from_worker = office_.epoch > 0;
+  const bool from_worker = terms_.epoch > 0;
   if (!surface.ok() || surface->camera_index != expected_camera) {
     const std::string message = surface.ok() ? absl::StrCat("surface ", digest, " is of camera ", surface->camera_index,
                                                             ", expected camera ", expected_camera)
@@ -365,17 +355,17 @@ void Conductor::Remember(const Commit& commit, const Outcome& outcome) {
                                             .camera = commit.camera,
                                             .digest = commit.accepted_digest,
                                             .patches = commit.accepted_patches}};
-  if (outcome.set_aside) ++progress_.cameras_set_aside;
+  if (outcome.skipped) ++progress_.cameras_skipped;
   progress_.patches_filtered += commit.filtered_patches;
   progress_.patches_accepted += commit.accepted_patches;
 }
 
 CommitRecord Conductor::RecordFor(const Assignment& assignment, const Outcome& outcome) const {
-  // Nobody can use the image of a camera that was set aside: all its pairs go.
+  // Nobody can use the image of a camera that was skipped: all its pairs go.
   return {.sequence = assignment.sequence,
           .camera = assignment.camera,
-          .weak_targets = outcome.set_aside ? schedule_.matrix().Neighbours(assignment.camera) : outcome.weak_targets,
-          .set_aside = outcome.set_aside};
+          .weak_targets = outcome.skipped ? schedule_.matrix().Neighbours(assignment.camera) : outcome.weak_targets,
+          .skipped = outcome.skipped};
 }
 
 CameraJobSpec Conductor::SpecFor(const Assignment& assignment, int64_t epoch) const {

@@ -22,41 +22,26 @@
 #include "coordinator/acceptance/acceptance.h"
 #include "coordinator/incidence/feasible_pairs.h"
 #include "coordinator/incidence/overlap_graph.h"
-#include "coordinator/incidence/target_selection.h"
+#include "coordinator/options/conductor_options.h"
 #include "coordinator/schedule/schedule.h"
 #include "coordinator/store/job_store.h"
 
 namespace meshwright {
 
-// What a reconstruction may decide differently on the coordinator's side.
-struct ConductorOptions {
-  FeasiblePairOptions pairs;
-  OverlapOptions overlap;
-  TargetSelectionOptions targets;
-  int window = ScheduleOptions{}.window;  // W of the order rule, >= 1
-  AcceptanceOptions acceptance;           // its k_a is also the K_a of the order rule
-  // Filtered surfaces of overlapping cameras that acceptance holds one camera's against, the largest ones, >= 1. In a
-  // dense set hundreds of cameras overlap each other and nearly all surface is in a few. V_r has no such limit:
-  // accepted surfaces hardly overlap, so that all of them together are no larger than what the camera sees.
-  int max_surfaces = 32;
-
-  absl::Status Validate() const;
-};
-
 struct Progress {
   int cameras_total = 0;      // committed, in flight and still waiting; shrinks when pruning leaves a camera no pair
-  int cameras_committed = 0;  // set aside ones included
-  int cameras_set_aside = 0;
+  int cameras_committed = 0;  // skipped ones included
+  int cameras_skipped = 0;
   int cameras_in_flight = 0;
   int64_t patches_filtered = 0;  // over committed cameras
   int64_t patches_accepted = 0;
 };
 
 // Who a conductor works for.
-struct ConductorOffice {
+struct ConductorLeaseTerms {
   // Of its lease in the store, which fences its writes; camera jobs are handed out from the store then, whoever asks
-  // there, and Absorb() looks for their results. 0: it is the only one that writes to the store, hands jobs out by
-  // TakeJobs() and is told their results by Complete().
+  // there, and IngestResults() looks for their results. 0: it is the only one that writes to the store, hands jobs out
+  // by TakeJobs() and is told their results by Complete().
   int64_t epoch = 0;
   // Bytes that a job takes at most when it is made smaller 0, 1, 2 ... times. May be empty.
   std::function<std::vector<int64_t>(const CameraJobSpec& spec)> job_bytes;
@@ -67,11 +52,11 @@ struct ConductorOffice {
 // Everything that has happened is in the JobStore; opening replays it, so a conductor may die at any moment. It has no
 // threads and knows nothing of how jobs are done.
 //
-// Thread-safe: calls take a mutex. Complete() and SetAside() commit whatever has become next in line, which loads the
+// Thread-safe: calls take a mutex. Complete() and Skip() commit whatever has become next in line, which loads the
 // filtered surfaces of overlapping cameras one after the other (tenths of a second each on large photographs); at most
 // three surfaces are in memory. Errors of the store and the BlobStore come back as they are; after one, a conductor
 // opened anew is in order, and after DataLoss or NotFound of a blob, which damaged_blob() then names, this one is too:
-// once the blob is mended, Absorb() goes on.
+// once the blob is mended, IngestResults() goes on.
 class Conductor {
  public:
   // The reconstruction must exist in `store`. `store`, `blobs`, `clock` and `pool` outlive the conductor. Jobs that
@@ -82,7 +67,7 @@ class Conductor {
                                                          const std::vector<SparsePoint>& points,
                                                          const ConductorOptions& options, JobStore* store,
                                                          BlobStore* blobs, const Clock* clock, ThreadPool* pool,
-                                                         ConductorOffice office = {});
+                                                         ConductorLeaseTerms terms = {});
 
   // Jobs that may start now and were not taken since the last commit that made them possible. Often empty.
   std::vector<CameraJobSpec> TakeJobs();
@@ -93,12 +78,12 @@ class Conductor {
   absl::Status Complete(SequenceNumber sequence, int64_t epoch, const std::string& filtered_digest,
                         const std::vector<CameraIndex>& weak_targets, const std::string& report_json);
   // Gives a job up: its camera contributes nothing and is nobody's target any more.
-  absl::Status SetAside(SequenceNumber sequence, int64_t epoch, const std::string& reason);
+  absl::Status Skip(SequenceNumber sequence, int64_t epoch, const std::string& reason);
 
-  // With an office: takes what has been done since the last call from the store and commits what is next. Returns
+  // With an terms: takes what has been done since the last call from the store and commits what is next. Returns
   // whether jobs were handed out. Results that are none (weak targets that are no neighbours, a surface that is not
-  // there or cannot be decoded) are taken back, after `max_failures` of them the job is set aside.
-  absl::StatusOr<bool> Absorb(int max_failures);
+  // there or cannot be decoded) are taken back, after `max_failures` of them the job is skipped.
+  absl::StatusOr<bool> IngestResults(int max_failures);
   // "" unless the last call failed since this blob is damaged or lost.
   std::string damaged_blob() const;
   // Makes M_r of a commit again from the filtered surfaces: the same bytes, so the blob is mended.
@@ -119,7 +104,7 @@ class Conductor {
   struct Outcome {  // of a finished job
     std::string filtered_digest;
     std::vector<CameraIndex> weak_targets;
-    bool set_aside = false;
+    bool skipped = false;
     int64_t epoch = 0;
   };
   struct Committed {
@@ -131,7 +116,7 @@ class Conductor {
 
   Conductor(std::string reconstruction_id, const std::vector<Camera>& cameras, FeasiblePairs pairs,
             OverlapGraph overlaps, const ConductorOptions& options, JobStore* store, BlobStore* blobs,
-            const Clock* clock, ThreadPool* pool, ConductorOffice office);
+            const Clock* clock, ThreadPool* pool, ConductorLeaseTerms terms);
 
   absl::Status Replay(const std::vector<CameraJob>& jobs, const std::vector<Commit>& commits);
   void Assign(const Assignment& assignment);
@@ -158,7 +143,7 @@ class Conductor {
   BlobStore* const blobs_;
   const Clock* const clock_;
   ThreadPool* const pool_;
-  const ConductorOffice office_;
+  const ConductorLeaseTerms terms_;
 
   mutable std::mutex mutex_;
   Schedule schedule_;

@@ -235,10 +235,10 @@ TEST_F(ConductorTest, ResultsThatDoNotFitAreRefused) {
   EXPECT_TRUE(Finish(spec).ok());
 }
 
-TEST_F(ConductorTest, ACameraSetAsideIsNobodysTargetAndTheRestGoesOn) {
+TEST_F(ConductorTest, ASkippedCameraIsNobodysTargetAndTheRestGoesOn) {
   StartAnew("run", {});
   const CameraJobSpec lost = conductor_->TakeJobs().front();
-  ASSERT_TRUE(conductor_->SetAside(lost.sequence, lost.epoch, "picture is gone").ok());
+  ASSERT_TRUE(conductor_->Skip(lost.sequence, lost.epoch, "picture is gone").ok());
   OpenConductor();
   while (!conductor_->finished()) {
     for (const CameraJobSpec& spec : conductor_->TakeJobs()) {
@@ -248,7 +248,7 @@ TEST_F(ConductorTest, ACameraSetAsideIsNobodysTargetAndTheRestGoesOn) {
       ASSERT_TRUE(Finish(spec).ok());
     }
   }
-  EXPECT_EQ(conductor_->progress().cameras_set_aside, 1);
+  EXPECT_EQ(conductor_->progress().cameras_skipped, 1);
   for (const AcceptedSurface& surface : conductor_->AcceptedSurfaces()) EXPECT_NE(surface.camera, lost.camera);
 }
 

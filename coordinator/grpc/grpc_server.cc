@@ -59,13 +59,14 @@ absl::Status SendFile(const std::string& path, int64_t offset, grpc::ServerWrite
   return std::ferror(file.get()) != 0 ? absl::DataLossError("the mesh's file cannot be read") : absl::OkStatus();
 }
 
-class ReconstructionShell final : public v1::ReconstructionService::Service {
+class ReconstructionServiceImpl final : public v1::ReconstructionService::Service {
  public:
-  ReconstructionShell(ReconstructionLogic& logic, WorkerLogic& workers) : logic_(logic), workers_(workers) {}
+  ReconstructionServiceImpl(ReconstructionService& service, WorkerService& workers)
+      : service_(service), workers_(workers) {}
 
   grpc::Status CreateReconstruction(grpc::ServerContext*, const v1::CreateReconstructionRequest* request,
                                     v1::CreateReconstructionResponse* response) override {
-    return Answer(logic_.Create(*request), [&](const auto& value) { *response->mutable_reconstruction() = value; });
+    return Answer(service_.Create(*request), [&](const auto& value) { *response->mutable_reconstruction() = value; });
   }
   grpc::Status UploadSceneFile(grpc::ServerContext*, grpc::ServerReader<v1::UploadSceneFileRequest>* reader,
                                v1::UploadSceneFileResponse*) override {
@@ -73,19 +74,20 @@ class ReconstructionShell final : public v1::ReconstructionService::Service {
   }
   grpc::Status StartReconstruction(grpc::ServerContext*, const v1::StartReconstructionRequest* request,
                                    v1::StartReconstructionResponse* response) override {
-    return Answer(logic_.Start(request->id()), [&](const auto& value) { *response->mutable_reconstruction() = value; });
+    return Answer(service_.Start(request->id()),
+                  [&](const auto& value) { *response->mutable_reconstruction() = value; });
   }
   grpc::Status GetReconstruction(grpc::ServerContext*, const v1::GetReconstructionRequest* request,
                                  v1::GetReconstructionResponse* response) override {
-    return Answer(logic_.Get(request->id()), [&](const auto& value) { *response->mutable_reconstruction() = value; });
+    return Answer(service_.Get(request->id()), [&](const auto& value) { *response->mutable_reconstruction() = value; });
   }
   grpc::Status ListReconstructions(grpc::ServerContext*, const v1::ListReconstructionsRequest* request,
                                    v1::ListReconstructionsResponse* response) override {
-    return Answer(logic_.List(*request), [&](const auto& value) { *response = value; });
+    return Answer(service_.List(*request), [&](const auto& value) { *response = value; });
   }
   grpc::Status WatchReconstruction(grpc::ServerContext* context, const v1::WatchReconstructionRequest* request,
                                    grpc::ServerWriter<v1::WatchReconstructionResponse>* writer) override {
-    return ToGrpc(logic_.Watch(request->id(), [&](const v1::Reconstruction& reconstruction) {
+    return ToGrpc(service_.Watch(request->id(), [&](const v1::Reconstruction& reconstruction) {
       v1::WatchReconstructionResponse response;
       *response.mutable_reconstruction() = reconstruction;
       return !context->IsCancelled() && writer->Write(response);
@@ -93,38 +95,38 @@ class ReconstructionShell final : public v1::ReconstructionService::Service {
   }
   grpc::Status CancelReconstruction(grpc::ServerContext*, const v1::CancelReconstructionRequest* request,
                                     v1::CancelReconstructionResponse* response) override {
-    return Answer(logic_.Cancel(request->id()),
+    return Answer(service_.Cancel(request->id()),
                   [&](const auto& value) { *response->mutable_reconstruction() = value; });
   }
   grpc::Status DeleteReconstruction(grpc::ServerContext*, const v1::DeleteReconstructionRequest* request,
                                     v1::DeleteReconstructionResponse*) override {
-    return ToGrpc(logic_.Delete(request->id()));
+    return ToGrpc(service_.Delete(request->id()));
   }
   grpc::Status ListCameras(grpc::ServerContext*, const v1::ListCamerasRequest* request,
                            v1::ListCamerasResponse* response) override {
-    return Answer(logic_.ListCameras(request->id()), [&](const auto& value) { *response = value; });
+    return Answer(service_.ListCameras(request->id()), [&](const auto& value) { *response = value; });
   }
   grpc::Status GetIncidence(grpc::ServerContext*, const v1::GetIncidenceRequest* request,
                             v1::GetIncidenceResponse* response) override {
-    return Answer(logic_.GetIncidence(request->id()), [&](const auto& value) { *response = value; });
+    return Answer(service_.GetIncidence(request->id()), [&](const auto& value) { *response = value; });
   }
   grpc::Status ListParts(grpc::ServerContext*, const v1::ListPartsRequest* request,
                          v1::ListPartsResponse* response) override {
-    return Answer(logic_.ListParts(request->id(), request->after()), [&](const auto& value) { *response = value; });
+    return Answer(service_.ListParts(request->id(), request->after()), [&](const auto& value) { *response = value; });
   }
   grpc::Status DownloadMesh(grpc::ServerContext*, const v1::DownloadMeshRequest* request,
                             grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {
-    const absl::StatusOr<std::string> path = logic_.MeshPath(request->id());
+    const absl::StatusOr<std::string> path = service_.MeshPath(request->id());
     return ToGrpc(path.ok() ? SendFile(*path, request->offset_bytes(), *writer) : path.status());
   }
   grpc::Status DownloadPart(grpc::ServerContext*, const v1::DownloadPartRequest* request,
                             grpc::ServerWriter<v1::DownloadPartResponse>* writer) override {
-    const absl::StatusOr<std::string> bytes = logic_.PartBytes(request->id(), request->sequence());
+    const absl::StatusOr<std::string> bytes = service_.PartBytes(request->id(), request->sequence());
     return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
   }
   grpc::Status ListAttempts(grpc::ServerContext*, const v1::ListAttemptsRequest* request,
                             v1::ListAttemptsResponse* response) override {
-    return Answer(logic_.ListAttempts(*request), [&](const auto& value) { *response = value; });
+    return Answer(service_.ListAttempts(*request), [&](const auto& value) { *response = value; });
   }
   grpc::Status ListWorkers(grpc::ServerContext*, const v1::ListWorkersRequest*,
                            v1::ListWorkersResponse* response) override {
@@ -138,7 +140,7 @@ class ReconstructionShell final : public v1::ReconstructionService::Service {
     if (!reader.Read(&request) || !request.has_header()) {
       return absl::InvalidArgumentError("header: expected in the first message");
     }
-    MW_ASSIGN_OR_RETURN(SceneFileUpload upload, logic_.BeginUpload(request.header()));
+    MW_ASSIGN_OR_RETURN(SceneFileUpload upload, service_.BeginUpload(request.header()));
     while (reader.Read(&request)) {
       if (!request.has_chunk()) return absl::InvalidArgumentError("chunk: expected in all messages but the first");
       MW_RETURN_IF_ERROR(upload.Append(request.chunk()));
@@ -146,16 +148,16 @@ class ReconstructionShell final : public v1::ReconstructionService::Service {
     return upload.Finish();
   }
 
-  ReconstructionLogic& logic_;
-  WorkerLogic& workers_;
+  ReconstructionService& service_;
+  WorkerService& workers_;
 };
 
-// A call that waits for work waits without a thread of its own: the logic answers it when there is something to say.
+// A call that waits for work waits without a thread of its own: the service answers it when there is something to say.
 class WaitingWorker final : public grpc::ServerUnaryReactor {
  public:
-  WaitingWorker(WorkerLogic& logic, const v1::SynchronizeRequest& request, v1::SynchronizeResponse& response)
-      : logic_(logic) {
-    call_ = logic_.Synchronize(request, [this, &response](absl::StatusOr<v1::SynchronizeResponse> answer) {
+  WaitingWorker(WorkerService& service, const v1::SynchronizeRequest& request, v1::SynchronizeResponse& response)
+      : service_(service) {
+    call_ = service_.Synchronize(request, [this, &response](absl::StatusOr<v1::SynchronizeResponse> answer) {
       if (answer.ok()) response = *std::move(answer);
       Finish(ToGrpc(answer.status()));
     });
@@ -164,36 +166,36 @@ class WaitingWorker final : public grpc::ServerUnaryReactor {
       is_known_ = true;
       if (!is_cancelled_) return;
     }
-    logic_.Abandon(call_);
+    service_.Abandon(call_);
   }
 
-  // Neither comes before the constructor has ended and both may come at any time after it; the answer, from the logic's
-  // thread, may come within it.
+  // Neither comes before the constructor has ended and both may come at any time after it; the answer, from the
+  // service's thread, may come within it.
   void OnCancel() override {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       is_cancelled_ = true;
       if (!is_known_) return;
     }
-    logic_.Abandon(call_);
+    service_.Abandon(call_);
   }
   void OnDone() override { delete this; }
 
  private:
-  WorkerLogic& logic_;
+  WorkerService& service_;
   int64_t call_ = 0;
   std::mutex mutex_;
   bool is_known_ = false;
   bool is_cancelled_ = false;
 };
 
-class WorkerShell final : public v1::WorkerService::WithCallbackMethod_Synchronize<v1::WorkerService::Service> {
+class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Synchronize<v1::WorkerService::Service> {
  public:
-  WorkerShell(WorkerLogic& logic, BlobStore& blobs) : logic_(logic), blobs_(blobs) {}
+  WorkerServiceImpl(WorkerService& service, BlobStore& blobs) : service_(service), blobs_(blobs) {}
 
   grpc::ServerUnaryReactor* Synchronize(grpc::CallbackServerContext*, const v1::SynchronizeRequest* request,
                                         v1::SynchronizeResponse* response) override {
-    return new WaitingWorker(logic_, *request, *response);
+    return new WaitingWorker(service_, *request, *response);
   }
   grpc::Status FetchBlob(grpc::ServerContext*, const v1::FetchBlobRequest* request,
                          grpc::ServerWriter<v1::FetchBlobResponse>* writer) override {
@@ -226,17 +228,17 @@ class WorkerShell final : public v1::WorkerService::WithCallbackMethod_Synchroni
     return blobs_.Put(bytes);
   }
 
-  WorkerLogic& logic_;
+  WorkerService& service_;
   BlobStore& blobs_;
 };
 
 class RealGrpcServer final : public GrpcServer {
  public:
-  RealGrpcServer(ReconstructionLogic& reconstructions, WorkerLogic& workers, BlobStore& blobs)
+  RealGrpcServer(ReconstructionService& reconstructions, WorkerService& workers, BlobStore& blobs)
       : reconstructions_(reconstructions),
         workers_(workers),
-        reconstruction_shell_(reconstructions, workers),
-        worker_shell_(workers, blobs) {}
+        reconstruction_service_impl_(reconstructions, workers),
+        worker_service_impl_(workers, blobs) {}
   ~RealGrpcServer() override { Shutdown(absl::Seconds(1)); }
 
   absl::Status Listen(const std::string& address, GrpcServer::Interceptors interceptors) {
@@ -249,8 +251,8 @@ class RealGrpcServer final : public GrpcServer {
     builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5000);
     builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
     if (!interceptors.empty()) builder.experimental().SetInterceptorCreators(std::move(interceptors));
-    builder.RegisterService(&reconstruction_shell_);
-    builder.RegisterService(&worker_shell_);
+    builder.RegisterService(&reconstruction_service_impl_);
+    builder.RegisterService(&worker_service_impl_);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr || port_ == 0) {
       return absl::UnavailableError(absl::StrCat("cannot listen on ", address));
@@ -270,10 +272,10 @@ class RealGrpcServer final : public GrpcServer {
   }
 
  private:
-  ReconstructionLogic& reconstructions_;
-  WorkerLogic& workers_;
-  ReconstructionShell reconstruction_shell_;
-  WorkerShell worker_shell_;
+  ReconstructionService& reconstructions_;
+  WorkerService& workers_;
+  ReconstructionServiceImpl reconstruction_service_impl_;
+  WorkerServiceImpl worker_service_impl_;
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;
 };
@@ -281,8 +283,8 @@ class RealGrpcServer final : public GrpcServer {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const std::string& address,
-                                                              ReconstructionLogic& reconstructions,
-                                                              WorkerLogic& workers, BlobStore& blobs,
+                                                              ReconstructionService& reconstructions,
+                                                              WorkerService& workers, BlobStore& blobs,
                                                               Interceptors interceptors) {
   auto server = std::make_unique<RealGrpcServer>(reconstructions, workers, blobs);
   MW_RETURN_IF_ERROR(server->Listen(address, std::move(interceptors)));

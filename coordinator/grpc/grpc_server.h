@@ -9,8 +9,8 @@
 #include <grpcpp/support/server_interceptor.h>
 
 #include "common/blob/blob_store.h"
-#include "coordinator/api/reconstruction_logic.h"
-#include "coordinator/api/worker_logic.h"
+#include "coordinator/api/reconstruction_service.h"
+#include "coordinator/dispatch/worker_service.h"
 
 namespace meshwright {
 
@@ -21,8 +21,9 @@ class GrpcServer {
 
   // `address`: "host:port"; port 0 takes a free one. All of it outlives the server.
   static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(const std::string& address,
-                                                           ReconstructionLogic& reconstructions, WorkerLogic& workers,
-                                                           BlobStore& blobs, Interceptors interceptors = {});
+                                                           ReconstructionService& reconstructions,
+                                                           WorkerService& workers, BlobStore& blobs,
+                                                           Interceptors interceptors = {});
   virtual ~GrpcServer() = default;
   virtual int port() const = 0;
   // Answers what waits, then ends calls that last longer than `deadline`.

@@ -64,11 +64,11 @@ constexpr ptrdiff_t kMaxLogEntries = 1000;
 // The last ones that cameras are counted and failures looked for in.
 constexpr int kAttemptsLookedAt = 20'000;
 
-absl::StatusOr<v1::ListAttemptsResponse> LastAttempts(const ReconstructionLogic& logic, const std::string& id) {
+absl::StatusOr<v1::ListAttemptsResponse> LastAttempts(const ReconstructionService& service, const std::string& id) {
   v1::ListAttemptsRequest request;
   request.set_id(id);
   request.set_max_attempts(kAttemptsLookedAt);
-  return logic.ListAttempts(request);
+  return service.ListAttempts(request);
 }
 
 struct LogEntry {
@@ -106,12 +106,12 @@ std::optional<LogEntry> EntryOf(const v1::Attempt& attempt, const std::string& c
 
 }  // namespace
 
-absl::StatusOr<Json> CamerasJson(const ReconstructionLogic& logic, const std::string& id) {
-  MW_ASSIGN_OR_RETURN(const v1::ListCamerasResponse cameras, logic.ListCameras(id));
+absl::StatusOr<Json> CamerasJson(const ReconstructionService& service, const std::string& id) {
+  MW_ASSIGN_OR_RETURN(const v1::ListCamerasResponse cameras, service.ListCameras(id));
   Json list = Json::array();
   if (cameras.cameras_size() > 0) {
-    MW_ASSIGN_OR_RETURN(const Scene scene, logic.LoadScene(id));
-    MW_ASSIGN_OR_RETURN(const v1::ListAttemptsResponse attempts, LastAttempts(logic, id));
+    MW_ASSIGN_OR_RETURN(const Scene scene, service.LoadScene(id));
+    MW_ASSIGN_OR_RETURN(const v1::ListAttemptsResponse attempts, LastAttempts(service, id));
     std::map<int32_t, int> count;
     std::map<int32_t, std::string> last_worker;
     for (const v1::Attempt& attempt : attempts.attempts()) {
@@ -133,10 +133,10 @@ absl::StatusOr<Json> CamerasJson(const ReconstructionLogic& logic, const std::st
   return response;
 }
 
-absl::StatusOr<Json> LogJson(const ReconstructionLogic& logic, const std::string& id) {
-  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, logic.Get(id));
-  MW_ASSIGN_OR_RETURN(const v1::ListCamerasResponse cameras, logic.ListCameras(id));
-  MW_ASSIGN_OR_RETURN(const v1::ListAttemptsResponse attempts, LastAttempts(logic, id));
+absl::StatusOr<Json> LogJson(const ReconstructionService& service, const std::string& id) {
+  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, service.Get(id));
+  MW_ASSIGN_OR_RETURN(const v1::ListCamerasResponse cameras, service.ListCameras(id));
+  MW_ASSIGN_OR_RETURN(const v1::ListAttemptsResponse attempts, LastAttempts(service, id));
   std::vector<LogEntry> entries;
   entries.push_back({TimeOf(reconstruction.create_time()), kInfo, "created"});
   const absl::Time now = reconstruction.has_finish_time() ? TimeOf(reconstruction.finish_time()) : absl::Now();
@@ -151,10 +151,10 @@ absl::StatusOr<Json> LogJson(const ReconstructionLogic& logic, const std::string
   // Attempts come with the last ones first, and of the same moment the last one is to be told last.
   std::reverse(entries.begin() + 1, entries.end());
   for (const v1::Camera& camera : cameras.cameras()) {
-    if (camera.state() != v1::CAMERA_STATE_SET_ASIDE) continue;
+    if (camera.state() != v1::CAMERA_STATE_SKIPPED) continue;
     const auto end = last_end.find(camera.index());
     entries.push_back({end != last_end.end() ? end->second : now, kError,
-                       absl::StrCat(camera.name(), " was set aside: ", camera.set_aside_reason()), camera.index()});
+                       absl::StrCat(camera.name(), " was skipped: ", camera.skip_reason()), camera.index()});
   }
   if (reconstruction.has_finish_time()) {
     const bool failed = reconstruction.state() == v1::RECONSTRUCTION_STATE_FAILED;

@@ -130,8 +130,8 @@ absl::Status SendFile(RestCall& call, std::shared_ptr<const OpenedFile> file, co
   return absl::OkStatus();
 }
 
-absl::Status SendForever(RestCall& call, const std::string& etag, const std::string& content_type,
-                         const std::function<absl::StatusOr<std::string>()>& make) {
+absl::Status SendImmutable(RestCall& call, const std::string& etag, const std::string& content_type,
+                           const std::function<absl::StatusOr<std::string>()>& make) {
   if (HasCopy(call, etag)) {
     call.response.status = 304;
   } else {

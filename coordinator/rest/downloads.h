@@ -48,8 +48,8 @@ absl::Status SendFile(RestCall& call, std::shared_ptr<const OpenedFile> file, co
                       const std::string& content_type, const std::string& name);
 
 // Answers with bytes that never change under this path, or with 304.
-absl::Status SendForever(RestCall& call, const std::string& etag, const std::string& content_type,
-                         const std::function<absl::StatusOr<std::string>()>& make);
+absl::Status SendImmutable(RestCall& call, const std::string& etag, const std::string& content_type,
+                           const std::function<absl::StatusOr<std::string>()>& make);
 
 // Whether the client's copy is good.
 bool HasCopy(const RestCall& call, const std::string& etag);

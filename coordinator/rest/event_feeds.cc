@@ -37,8 +37,8 @@ struct EventFeeds::Feed {
   bool gone = false;  // deleted
 };
 
-EventFeeds::EventFeeds(const ReconstructionLogic& logic, const EventFeedOptions& options)
-    : logic_(logic), options_(options), thread_([this] { Run(); }) {}
+EventFeeds::EventFeeds(const ReconstructionService& service, const EventFeedOptions& options)
+    : service_(service), options_(options), thread_([this] { Run(); }) {}
 
 EventFeeds::~EventFeeds() {
   Shutdown();
@@ -60,7 +60,7 @@ int EventFeeds::streams() const {
 }
 
 absl::StatusOr<std::unique_ptr<EventFeeds::Stream>> EventFeeds::Open(const std::string& id, int64_t after_part) {
-  MW_RETURN_IF_ERROR(logic_.Get(id).status());
+  MW_RETURN_IF_ERROR(service_.Get(id).status());
   std::unique_ptr<Stream> stream;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -110,12 +110,12 @@ bool EventFeeds::Look(const std::string& id, Feed& feed) {
     if (!feed.parts.empty()) known = feed.parts.back().sequence;
   }
   // Parts after the reconstruction: when that is over there are no more than these.
-  const absl::StatusOr<v1::Reconstruction> now = logic_.Get(id);
+  const absl::StatusOr<v1::Reconstruction> now = service_.Get(id);
   absl::Status status = now.status();
   const bool over = now.ok() && IsOver(now->state());
   std::vector<Feed::PartEvent> added;
   if (status.ok() && (over || now->progress().cameras_committed() != committed)) {
-    const absl::StatusOr<v1::ListPartsResponse> parts = logic_.ListParts(id, known);
+    const absl::StatusOr<v1::ListPartsResponse> parts = service_.ListParts(id, known);
     status = parts.status();
     for (int i = 0; parts.ok() && i < parts->parts_size(); ++i) {
       const v1::Part& part = parts->parts(i);

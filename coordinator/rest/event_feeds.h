@@ -13,7 +13,7 @@
 #include <absl/status/statusor.h>
 #include <absl/time/time.h>
 
-#include "coordinator/api/reconstruction_logic.h"
+#include "coordinator/api/reconstruction_service.h"
 
 namespace meshwright {
 
@@ -31,7 +31,7 @@ class EventFeeds {
   struct Feed;
 
  public:
-  EventFeeds(const ReconstructionLogic& logic, const EventFeedOptions& options);
+  EventFeeds(const ReconstructionService& service, const EventFeedOptions& options);
   // Ends all streams.
   ~EventFeeds();
 
@@ -69,7 +69,7 @@ class EventFeeds {
   // Whether there may be news later.
   bool Look(const std::string& id, Feed& feed);
 
-  const ReconstructionLogic& logic_;
+  const ReconstructionService& service_;
   const EventFeedOptions options_;
   mutable std::mutex mutex_;
   std::condition_variable news_;  // for streams

@@ -25,7 +25,7 @@ constexpr std::array<HttpTitle, 18> kTitles = {{{400, "Bad Request"},
                                                 {401, "Unauthorized"},
                                                 {403, "Forbidden"},
                                                 {404, "Not Found"},
-                                                {405, "Method Not Allowed"},
+                                                {405, "ReconstructionConfig Not Allowed"},
                                                 {409, "Conflict"},
                                                 {411, "Length Required"},
                                                 {413, "Content Too Large"},
@@ -47,7 +47,7 @@ const char* TitleOf(int http_status) {
   return http_status < 500 ? "Bad Request" : "Internal Server Error";
 }
 
-// The names of fields that messages of the logic behind this interface begin with.
+// The names of fields that messages of the service behind this interface begin with.
 bool IsField(const std::string& name) {
   static constexpr std::array<const char*, 11> kFields = {
       "id",   "options_json", "scene_reference", "weight", "page_size", "page_token",

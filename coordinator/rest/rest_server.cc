@@ -107,8 +107,8 @@ class RealRestServer final : public RestServer {
     server_.new_task_queue = [threads = static_cast<size_t>(options_.max_event_streams + kOtherConnections)] {
       return new httplib::ThreadPool(threads);
     };
-    server_.set_read_timeout(options_.patience_seconds);
-    server_.set_write_timeout(options_.patience_seconds);
+    server_.set_read_timeout(options_.idle_timeout_seconds);
+    server_.set_write_timeout(options_.idle_timeout_seconds);
     server_.set_keep_alive_max_count(kRequestsPerConnection);
     server_.set_tcp_nodelay(true);  // events are small and must not wait for each other
     // The default shares the port with whoever else asks for it: two coordinators would answer in turns.

@@ -8,8 +8,8 @@
 #include <absl/status/statusor.h>
 
 #include "common/blob/blob_store.h"
-#include "coordinator/api/reconstruction_logic.h"
-#include "coordinator/api/worker_logic.h"
+#include "coordinator/api/reconstruction_service.h"
+#include "coordinator/dispatch/worker_service.h"
 
 namespace meshwright {
 
@@ -19,19 +19,19 @@ struct RestOptions {
   std::string page_folder;  // the dashboard's files; "": none
   std::string token;        // that callers have to show; "": none
   int max_event_streams = 200;
-  int patience_seconds = 10;  // clients that neither send nor take anything for so long are dropped
+  int idle_timeout_seconds = 10;  // clients that neither send nor take anything for so long are dropped
 };
 
 // What the server is a shell over. All of it outlives the server.
 struct RestServices {
-  ReconstructionLogic* reconstructions = nullptr;
-  WorkerLogic* workers = nullptr;
+  ReconstructionService* reconstructions = nullptr;
+  WorkerService* workers = nullptr;
   BlobStore* blobs = nullptr;
   std::function<absl::Status()> ready;  // whether store and blobs can be reached
   std::string options_json;             // the answer of GET /v1/options
 };
 
-// The public interface over HTTP, as openapi.yaml says, and the dashboard's files: a thin shell over the logic.
+// The public interface over HTTP, as openapi.yaml says, and the dashboard's files: a thin shell over the service.
 class RestServer {
  public:
   // InvalidArgument, or Unavailable when the port is taken.

@@ -53,7 +53,7 @@ absl::Status PreviewPart(const RestContext& context, RestCall& call) {
                       QueryNumber(call, "max_faces", 1, kMaxPreviewFaces, kDefaultPreviewFaces));
   MW_ASSIGN_OR_RETURN(const v1::Part part, FindPart(context, call));
   const std::string etag = absl::StrCat(part.sha256(), "-", part.sequence(), "-", max_faces);
-  return SendForever(call, etag, "application/octet-stream", [&]() -> absl::StatusOr<std::string> {
+  return SendImmutable(call, etag, "application/octet-stream", [&]() -> absl::StatusOr<std::string> {
     MW_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->Get(part.sha256()));
     MW_ASSIGN_OR_RETURN(const SparseSurface surface, DecodeSparseSurface(bytes));
     return MakePartPreview(surface, part.sequence(), max_faces);

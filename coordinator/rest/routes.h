@@ -7,8 +7,8 @@
 #include <absl/status/status.h>
 
 #include "common/blob/blob_store.h"
-#include "coordinator/api/reconstruction_logic.h"
-#include "coordinator/api/worker_logic.h"
+#include "coordinator/api/reconstruction_service.h"
+#include "coordinator/dispatch/worker_service.h"
 #include "coordinator/rest/downloads.h"
 #include "coordinator/rest/event_feeds.h"
 #include "coordinator/rest/router.h"
@@ -18,8 +18,8 @@ namespace meshwright {
 
 // What handlers work with. All of it outlives them.
 struct RestContext {
-  ReconstructionLogic* reconstructions = nullptr;
-  WorkerLogic* workers = nullptr;
+  ReconstructionService* reconstructions = nullptr;
+  WorkerService* workers = nullptr;
   BlobStore* blobs = nullptr;
   SceneUploads* uploads = nullptr;
   DerivedFiles* derived = nullptr;

@@ -75,7 +75,7 @@ absl::Status Photo(const RestContext& context, RestCall& call) {
   }
   const SceneView& view = scene.views[static_cast<size_t>(camera)];
   const std::string& digest = view.image_path;
-  return SendForever(call, absl::StrCat(digest, "-", width), "image/jpeg", [&]() -> absl::StatusOr<std::string> {
+  return SendImmutable(call, absl::StrCat(digest, "-", width), "image/jpeg", [&]() -> absl::StatusOr<std::string> {
     MW_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->Get(digest));
     MW_ASSIGN_OR_RETURN(const ColorImage image, DecodeImageBytes(bytes, view.name));
     const int columns = std::min(static_cast<int>(width), image.width);

@@ -14,8 +14,9 @@
 
 #include "common/base/digest.h"
 #include "common/base/files.h"
+#include "common/base/relative_path.h"
 #include "common/base/status_macros.h"
-#include "coordinator/api/scene_intake.h"
+#include "coordinator/api/scene_upload.h"
 #include "coordinator/rest/problem.h"
 
 namespace meshwright {
@@ -177,13 +178,13 @@ absl::Status CompareRepeated(const SceneFilePart& part, int64_t end_bytes, const
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<SceneUploads>> SceneUploads::Open(const std::string& folder,
-                                                                 ReconstructionLogic& logic) {
+                                                                 ReconstructionService& service) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {
     return absl::PermissionDeniedError(absl::StrCat(folder, ": cannot make the folder: ", error.message()));
   }
-  auto uploads = std::unique_ptr<SceneUploads>(new SceneUploads(folder, logic));
+  auto uploads = std::unique_ptr<SceneUploads>(new SceneUploads(folder, service));
   uploads->Sweep();
   return uploads;
 }
@@ -194,7 +195,7 @@ std::string SceneUploads::StatePath(const std::string& id, const std::string& pa
 }
 
 absl::Status SceneUploads::CheckTakesFiles(const std::string& id) const {
-  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, logic_.Get(id));
+  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, service_.Get(id));
   if (reconstruction.state() != v1::RECONSTRUCTION_STATE_CREATED) {
     return absl::FailedPreconditionError(absl::StrCat("reconstruction ", id, " is ",
                                                       v1::ReconstructionState_Name(reconstruction.state()),
@@ -217,7 +218,7 @@ absl::Status SceneUploads::Deliver(const std::string& id, const SceneFileState& 
   header.set_path(state.path);
   header.set_size_bytes(state.size_bytes);
   header.set_sha256(state.sha256);
-  MW_ASSIGN_OR_RETURN(SceneFileUpload upload, logic_.BeginUpload(header));
+  MW_ASSIGN_OR_RETURN(SceneFileUpload upload, service_.BeginUpload(header));
   MW_ASSIGN_OR_RETURN(const PartialFile file, PartialFile::Open(StatePath(id, state.path) + kBytesEnding));
   Sha256Stream stream;
   for (int64_t offset = 0; offset < state.size_bytes;) {
@@ -235,7 +236,7 @@ absl::Status SceneUploads::Deliver(const std::string& id, const SceneFileState& 
 }
 
 bool SceneUploads::HasTaken(const std::string& id, const SceneFileState& state) const {
-  const absl::StatusOr<std::vector<SceneFile>> taken = logic_.ListSceneFiles(id);
+  const absl::StatusOr<std::vector<SceneFile>> taken = service_.ListSceneFiles(id);
   return taken.ok() &&
          std::find(taken->begin(), taken->end(), SceneFile{state.path, state.size_bytes, state.sha256}) != taken->end();
 }
@@ -311,7 +312,7 @@ absl::StatusOr<SceneFileState> SceneUploads::Get(const std::string& id, const st
 }
 
 absl::StatusOr<std::vector<SceneFileState>> SceneUploads::List(const std::string& id) const {
-  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, logic_.Get(id));
+  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, service_.Get(id));
   std::vector<SceneFileState> files;
   if (reconstruction.state() != v1::RECONSTRUCTION_STATE_CREATED) return files;
   std::error_code error;
@@ -321,7 +322,7 @@ absl::StatusOr<std::vector<SceneFileState>> SceneUploads::List(const std::string
     if (state && !state->complete) files.push_back(*std::move(state));
   }
   // What is complete the reconstruction says: it may have come by another way.
-  MW_ASSIGN_OR_RETURN(const std::vector<SceneFile> taken, logic_.ListSceneFiles(id));
+  MW_ASSIGN_OR_RETURN(const std::vector<SceneFile> taken, service_.ListSceneFiles(id));
   std::set<std::string> begun;
   for (const SceneFileState& file : files) begun.insert(file.path);
   for (const SceneFile& file : taken) {

@@ -12,7 +12,7 @@
 #include <absl/status/statusor.h>
 #include <absl/types/span.h>
 
-#include "coordinator/api/reconstruction_logic.h"
+#include "coordinator/api/reconstruction_service.h"
 
 namespace meshwright {
 
@@ -40,11 +40,11 @@ struct SceneFilePart {
 class SceneUploads {
  public:
   using Take = std::function<absl::Status(absl::Span<const uint8_t>)>;
-  // Hands over the part's bytes in pieces; errors of `take` are given back.
+  // Hands over the part's bytes in pieces; errors of `take` are released.
   using Read = std::function<absl::Status(const Take& take)>;
 
   // Makes the folder when it is not there.
-  static absl::StatusOr<std::unique_ptr<SceneUploads>> Open(const std::string& folder, ReconstructionLogic& logic);
+  static absl::StatusOr<std::unique_ptr<SceneUploads>> Open(const std::string& folder, ReconstructionService& service);
 
   // Errors beside those of `read` and of the reconstruction: InvalidArgument for fields; Aborted when the part begins
   // elsewhere than the one before ended, says other bytes than those that are there, or comes at the same time as
@@ -58,7 +58,7 @@ class SceneUploads {
   void Sweep() const;
 
  private:
-  SceneUploads(std::string folder, ReconstructionLogic& logic) : folder_(std::move(folder)), logic_(logic) {}
+  SceneUploads(std::string folder, ReconstructionService& service) : folder_(std::move(folder)), service_(service) {}
 
   absl::Status CheckTakesFiles(const std::string& id) const;
   std::string StatePath(const std::string& id, const std::string& path) const;
@@ -67,7 +67,7 @@ class SceneUploads {
   absl::Status Deliver(const std::string& id, const SceneFileState& state) const;
 
   const std::string folder_;
-  ReconstructionLogic& logic_;
+  ReconstructionService& service_;
   std::mutex mutex_;
   std::set<std::string> busy_;  // state paths of the files that a part arrives for
 };

@@ -39,7 +39,7 @@ struct CommitRecord {
   // Pairs (camera, t) to remove from the incidence matrix: fewer than m_S seeds (section 3.5). A camera that was set
   // aside because its image cannot be used names all its neighbours here, so that nobody asks for the image again.
   std::vector<CameraIndex> weak_targets;
-  bool set_aside = false;  // given up after repeated failures: the commit is empty, the schedule goes on
+  bool skipped = false;  // given up after repeated failures: the commit is empty, the schedule goes on
 
   friend bool operator==(const CommitRecord&, const CommitRecord&) = default;
 };

@@ -44,8 +44,8 @@ CommitRecord Answer(const Assignment& assignment, double prune_share) {
   for (const CameraIndex target : assignment.neighbours) {
     if (uniform(generator) < prune_share) commit.weak_targets.push_back(target);
   }
-  commit.set_aside = uniform(generator) < 0.1;
-  if (commit.set_aside) commit.weak_targets.clear();
+  commit.skipped = uniform(generator) < 0.1;
+  if (commit.skipped) commit.weak_targets.clear();
   return commit;
 }
 

@@ -22,7 +22,7 @@ enum class ReconstructionState { kCreated, kPreparing, kRunning, kJoining, kDone
 struct StoredProgress {
   int64_t cameras_total = 0;
   int64_t cameras_committed = 0;
-  int64_t cameras_set_aside = 0;
+  int64_t cameras_skipped = 0;
   int64_t cameras_in_flight = 0;
   int64_t patches_filtered = 0;
   int64_t patches_accepted = 0;
@@ -52,9 +52,9 @@ struct Reconstruction {
   StoredProgress progress;
 };
 
-// The life of a camera job: assigned -> done -> committed, or assigned -> set aside -> committed (with no surface).
+// The life of a camera job: assigned -> done -> committed, or assigned -> skipped -> committed (with no surface).
 // Jobs get done in any order; they are committed in the order of their sequence numbers.
-enum class CameraJobState { kAssigned, kDone, kSetAside };
+enum class CameraJobState { kAssigned, kDone, kSkipped };
 
 struct CameraJob {
   SequenceNumber sequence = 0;
@@ -67,7 +67,7 @@ struct CameraJob {
   std::string filtered_digest;            // F_r in the BlobStore; set when done
   std::vector<CameraIndex> weak_targets;  // pairs (camera, target) to be removed from the incidence matrix
   std::string report_json;                // what the worker says about the job; set when done
-  std::string set_aside_reason;
+  std::string skip_reason;
   std::vector<CameraIndex> neighbours;  // O_r as of the snapshot
   std::string spec;                     // what a worker needs to know (job_spec_codec); "" in lists
 
@@ -86,7 +86,7 @@ struct CameraJob {
   absl::Time lease_expires_at = absl::UnixEpoch();
 };
 
-// A job that is neither done nor set aside, with what has to be known to hand it out.
+// A job that is neither done nor skipped, with what has to be known to hand it out.
 struct OpenJob {
   std::string reconstruction_id;
   double weight = 1;  // the reconstruction's
@@ -105,10 +105,10 @@ struct OpenJob {
   absl::Time lease_expires_at;
 };
 
-// A job that is done or set aside.
+// A job that is done or skipped.
 struct JobResult {
   SequenceNumber sequence = 0;
-  bool set_aside = false;
+  bool skipped = false;
   int64_t epoch = 1;
   std::string filtered_digest;
   std::vector<CameraIndex> weak_targets;
@@ -130,7 +130,7 @@ struct JobChange {
     kClaim,     // a job that waits is leased to the worker, in the next epoch
     kRenew,     // the lease lasts until expires_at
     kComplete,  // the job is done; also when the lease ran out and nobody has taken the job over
-    kSetAside,  // the job is given up with a reason
+    kSkipped,   // the job is given up with a reason
     // The lease ends and the job waits again, at least until retry_at:
     kRelease,  // not the job's fault, counts for nothing
     kFail,
@@ -146,9 +146,9 @@ struct JobChange {
   std::string filtered_digest;                             // kComplete; the blob is durable
   std::vector<CameraIndex> weak_targets;                   // kComplete
   std::string report_json;                                 // kComplete
-  std::string reason;                                      // kFail, kLose, kSetAside
+  std::string reason;                                      // kFail, kLose, kSkipped
   absl::Time retry_at = absl::UnixEpoch();                 // kRelease, kFail, kLose
-  bool out_of_memory = false;                              // kFail, kSetAside: it ran out of memory
+  bool out_of_memory = false;                              // kFail, kSkipped: it ran out of memory
   bool reduce = false;                                     // kFail: make the job smaller from now on,
   int64_t memory_bytes = -1;                               // so that it needs this much
   absl::Time only_if_expired_at = absl::InfiniteFuture();  // kLose: only if the lease has run out by then
@@ -169,7 +169,7 @@ struct Attempt {
   std::string worker;
   absl::Time began_at;
   absl::Time ended_at;
-  std::string ending;  // finished, failed, out_of_memory, lost or given_back
+  std::string ending;  // finished, failed, out_of_memory, lost or released
   std::string reason;
 };
 
@@ -266,8 +266,8 @@ class JobStore {
                                          const std::vector<CameraIndex>& weak_targets, const std::string& report_json,
                                          absl::Time now) = 0;
   // Gives the job up with a reason. Repeating it is OK; the first reason stays.
-  virtual absl::Status SetCameraJobAside(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                         const std::string& reason, absl::Time now) = 0;
+  virtual absl::Status SkipCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
+                                     const std::string& reason, absl::Time now) = 0;
   // Takes a result back, so that the job is done again in a new epoch. With `expected_digest` since the blob is lost:
   // only the same result will do, and what failed before is forgotten. With "" since the result was none: one failure
   // more. Aborted when the job is not done in this epoch.
@@ -277,7 +277,7 @@ class JobStore {
   virtual absl::StatusOr<CameraJob> GetCameraJob(const std::string& id, SequenceNumber sequence) = 0;
   // By sequence, those with a number greater than `after`, without their specs.
   virtual absl::StatusOr<std::vector<CameraJob>> ListCameraJobs(const std::string& id, SequenceNumber after = 0) = 0;
-  // The same, of jobs that are done or set aside.
+  // The same, of jobs that are done or skipped.
   virtual absl::StatusOr<std::vector<JobResult>> ListResults(const std::string& id, SequenceNumber after = 0) = 0;
 
   // All open jobs of all reconstructions that run, leased or not, by reconstruction and sequence.
@@ -290,7 +290,7 @@ class JobStore {
   // The leases that ended, those that began last first. At most 16 of each job are kept.
   virtual absl::StatusOr<std::vector<Attempt>> ListAttempts(const std::string& id, int64_t limit) = 0;
 
-  // Adds commit number `commit.sequence`, which must be the next one, of a job that is done or set aside. The accepted
+  // Adds commit number `commit.sequence`, which must be the next one, of a job that is done or skipped. The accepted
   // surface must be durable already. Repeating the same commit is OK.
   virtual absl::Status AddCommit(const std::string& id, const Commit& commit, absl::Time now,
                                  int64_t conductor_epoch = 0) = 0;
@@ -327,10 +327,10 @@ class JobStore {
 
   // Says that a blob belongs to the reconstruction; to be called before the blob is put. False: a blob of this digest
   // is being deleted just now, ask again before putting it. Surfaces of jobs and commits belong to it anyhow.
-  virtual absl::StatusOr<bool> HoldBlob(const std::string& id, const std::string& digest) = 0;
+  virtual absl::StatusOr<bool> AddBlobRef(const std::string& id, const std::string& digest) = 0;
   // Of a reconstruction that is being deleted: its blobs that no other one has. Who wants to hold one of them has to
   // wait until the rows are deleted too.
-  virtual absl::StatusOr<std::vector<std::string>> LetBlobsVanish(const std::string& id) = 0;
+  virtual absl::StatusOr<std::vector<std::string>> MarkBlobsForDeletion(const std::string& id) = 0;
 
   // A blob that somebody could not read, for the conductor to look into.
   virtual absl::Status ReportDamagedBlob(const std::string& id, const std::string& digest) = 0;

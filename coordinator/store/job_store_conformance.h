@@ -156,13 +156,13 @@ TEST_P(JobStoreConformance, ResultsSurviveReopening) {
   ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
   ASSERT_TRUE(store().AssignCameraJob("castle", {2, 3, 0}, kNow).ok());
   ASSERT_TRUE(store().CompleteCameraJob("castle", 2, 1, Digest('a'), {4, 11}, R"({"seeds":9})", kNow).ok());
-  ASSERT_TRUE(store().SetCameraJobAside("castle", 1, 1, "picture is gone", kNow).ok());
+  ASSERT_TRUE(store().SkipCameraJob("castle", 1, 1, "picture is gone", kNow).ok());
   Reopen();
   const auto jobs = store().ListCameraJobs("castle");
   ASSERT_TRUE(jobs.ok());
   ASSERT_EQ(jobs->size(), 2);
-  EXPECT_EQ(jobs->at(0).state, CameraJobState::kSetAside);
-  EXPECT_EQ(jobs->at(0).set_aside_reason, "picture is gone");
+  EXPECT_EQ(jobs->at(0).state, CameraJobState::kSkipped);
+  EXPECT_EQ(jobs->at(0).skip_reason, "picture is gone");
   EXPECT_EQ(jobs->at(1).state, CameraJobState::kDone);
   EXPECT_EQ(jobs->at(1).filtered_digest, Digest('a'));
   EXPECT_THAT(jobs->at(1).weak_targets, testing::ElementsAre(4, 11));
@@ -175,7 +175,7 @@ TEST_P(JobStoreConformance, AnOldEpochMayNotWrite) {
   ASSERT_TRUE(epoch.ok()) << epoch.status();
   EXPECT_EQ(*epoch, 2);
   EXPECT_TRUE(absl::IsAborted(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow)));
-  EXPECT_TRUE(absl::IsAborted(store().SetCameraJobAside("castle", 1, 1, "slow", kNow)));
+  EXPECT_TRUE(absl::IsAborted(store().SkipCameraJob("castle", 1, 1, "slow", kNow)));
   EXPECT_EQ(store().ListCameraJobs("castle")->at(0).state, CameraJobState::kAssigned);
   EXPECT_TRUE(store().CompleteCameraJob("castle", 1, 2, Digest('b'), {}, "{}", kNow).ok());
   // Finished jobs are not handed out any more, and who comes late learns that it may drop its work.
@@ -189,7 +189,7 @@ TEST_P(JobStoreConformance, RepeatedResultsAreHarmless) {
   ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
   EXPECT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
   EXPECT_TRUE(absl::IsFailedPrecondition(store().CompleteCameraJob("castle", 1, 1, Digest('b'), {}, "{}", kNow)));
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().SetCameraJobAside("castle", 1, 1, "slow", kNow)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(store().SkipCameraJob("castle", 1, 1, "slow", kNow)));
 }
 
 TEST_P(JobStoreConformance, CommitsComeInOrderOnceAndOfFinishedJobs) {
@@ -200,7 +200,7 @@ TEST_P(JobStoreConformance, CommitsComeInOrderOnceAndOfFinishedJobs) {
   const Commit second = {2, 3, Digest('b'), 9, 4};
   EXPECT_TRUE(absl::IsFailedPrecondition(store().AddCommit("castle", second, kNow)));  // 1 is missing
   EXPECT_TRUE(absl::IsFailedPrecondition(store().AddCommit("castle", first, kNow)));   // not finished
-  ASSERT_TRUE(store().SetCameraJobAside("castle", 1, 1, "gone", kNow).ok());
+  ASSERT_TRUE(store().SkipCameraJob("castle", 1, 1, "gone", kNow).ok());
   EXPECT_TRUE(store().AddCommit("castle", first, kNow).ok());
   EXPECT_TRUE(store().AddCommit("castle", second, kNow).ok());
   EXPECT_TRUE(store().AddCommit("castle", second, kNow).ok());  // again: harmless
@@ -372,7 +372,7 @@ TEST_P(JobStoreConformance, AWorkerThatComesBackWithAStaleResultIsRefused) {
   ASSERT_TRUE(Claim(1, 2, "bee").status.ok());
   EXPECT_TRUE(absl::IsAborted(Complete(1, 2, Digest('a'))));
   for (const JobChange::Kind kind : {JobChange::Kind::kRenew, JobChange::Kind::kRelease, JobChange::Kind::kFail,
-                                     JobChange::Kind::kLose, JobChange::Kind::kSetAside}) {
+                                     JobChange::Kind::kLose, JobChange::Kind::kSkipped}) {
     EXPECT_TRUE(absl::IsAborted(End(kind, 1, 2, "ant", "crash"))) << static_cast<int>(kind);
   }
   EXPECT_EQ(store().GetCameraJob("castle", 1)->lease_worker, "bee");
@@ -407,7 +407,7 @@ TEST_P(JobStoreConformance, AttemptsAreRemembered) {
   done.report_json = "{}";
   ASSERT_TRUE(Apply(done, kNow + 2 * kLease).status.ok());
   ASSERT_TRUE(Claim(2, 1, "ant", kNow - kLease).status.ok());
-  ASSERT_TRUE(End(JobChange::Kind::kSetAside, 2, 2, "", "poison").ok());
+  ASSERT_TRUE(End(JobChange::Kind::kSkipped, 2, 2, "", "poison").ok());
   const auto attempts = store().ListAttempts("castle", 10);
   ASSERT_TRUE(attempts.ok()) << attempts.status();
   ASSERT_EQ(attempts->size(), 3);
@@ -445,7 +445,7 @@ TEST_P(JobStoreConformance, AResultThatIsLostIsMadeAgainAndMustBeTheSame) {
   EXPECT_EQ(open->at(0).epoch, 3);
   EXPECT_EQ(store().GetCameraJob("castle", 1)->expected_digest, Digest('a'));
   ASSERT_TRUE(Claim(1, 3, "bee").status.ok());
-  EXPECT_FALSE(End(JobChange::Kind::kSetAside, 1, 4, "bee", "poison").ok());
+  EXPECT_FALSE(End(JobChange::Kind::kSkipped, 1, 4, "bee", "poison").ok());
   EXPECT_FALSE(Complete(1, 4, Digest('c')).ok());
   EXPECT_TRUE(Complete(1, 4, Digest('a')).ok());
   EXPECT_EQ(store().GetCameraJob("castle", 1)->state, CameraJobState::kDone);
@@ -462,9 +462,9 @@ TEST_P(JobStoreConformance, AResultThatIsNoneIsTakenBack) {
   EXPECT_EQ(open->at(0).failed_attempts, 1);
   EXPECT_EQ(open->at(0).not_before, kNow + kLease);
   EXPECT_TRUE(store().ListResults("castle")->empty());
-  ASSERT_TRUE(store().SetCameraJobAside("castle", 1, 2, "no surface", kNow).ok());
+  ASSERT_TRUE(store().SkipCameraJob("castle", 1, 2, "no surface", kNow).ok());
   ASSERT_EQ(store().ListResults("castle")->size(), 1);
-  EXPECT_TRUE(store().ListResults("castle")->at(0).set_aside);
+  EXPECT_TRUE(store().ListResults("castle")->at(0).skipped);
   EXPECT_TRUE(store().ListResults("castle", 1)->empty());
 }
 
@@ -516,7 +516,7 @@ TEST_P(JobStoreConformance, AReconstructionHasOneConductorAtATime) {
   EXPECT_EQ(store().GetConductorLease("castle")->expires_at, kNow + 2 * kLease);
   EXPECT_EQ(*store().AcquireConductorLease("castle", "south", kNow + 9 * kLease, kNow + 2 * kLease), 2);
   EXPECT_TRUE(absl::IsAborted(store().RenewConductorLease("castle", 1, kNow + 9 * kLease, kNow)));
-  // Given back: the next one need not wait. A release of an old epoch changes nothing.
+  // Released: the next one need not wait. A release of an old epoch changes nothing.
   EXPECT_TRUE(store().ReleaseConductorLease("castle", 1, kNow).ok());
   EXPECT_EQ(store().ListConducted()->at(0).lease.expires_at, kNow + 9 * kLease);
   EXPECT_TRUE(store().ReleaseConductorLease("castle", 2, kNow + 3 * kLease).ok());
@@ -626,7 +626,7 @@ TEST_P(JobStoreConformance, FinalStatesStay) {
 TEST_P(JobStoreConformance, DeletingTakesEverythingAlong) {
   AssignJobs("castle", 2);
   ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
-  ASSERT_TRUE(store().SetCameraJobAside("castle", 1, 2, "gone", kNow).ok());
+  ASSERT_TRUE(store().SkipCameraJob("castle", 1, 2, "gone", kNow).ok());
   ASSERT_TRUE(store().AddCommit("castle", {1, 1, "", 0, 0}, kNow).ok());
   ASSERT_TRUE(store().AcquireConductorLease("castle", "north", kNow + kLease, kNow).ok());
   EXPECT_TRUE(store().DeleteReconstruction("castle").ok());
@@ -652,7 +652,7 @@ TEST_P(JobStoreConformance, ListsCanBeReadInPieces) {
   ASSERT_EQ(jobs->size(), 2);
   EXPECT_EQ(jobs->front().sequence, 2);
   for (int s = 1; s <= 3; ++s) {
-    ASSERT_TRUE(store().SetCameraJobAside("castle", s, 1, "gone", kNow).ok());
+    ASSERT_TRUE(store().SkipCameraJob("castle", s, 1, "gone", kNow).ok());
     ASSERT_TRUE(store().AddCommit("castle", {s, s, "", 0, 0}, kNow).ok());
   }
   EXPECT_THAT(*store().ListCommits("castle", 2), testing::ElementsAre(Commit{3, 3, "", 0, 0}));
@@ -668,8 +668,8 @@ TEST_P(JobStoreConformance, TextIsKeptAsItIs) {
   EXPECT_EQ(stored->id, odd);
   EXPECT_EQ(stored->options_json, "{ \"b\" : 1,\n \"a\":2}");
   AssignJobs(odd, 1);
-  ASSERT_TRUE(store().SetCameraJobAside(odd, 1, 1, std::string("a\0b\xe2\x82", 5), kNow).ok());
-  EXPECT_EQ(store().GetCameraJob(odd, 1)->set_aside_reason, "a?b??");
+  ASSERT_TRUE(store().SkipCameraJob(odd, 1, 1, std::string("a\0b\xe2\x82", 5), kNow).ok());
+  EXPECT_EQ(store().GetCameraJob(odd, 1)->skip_reason, "a?b??");
 }
 
 // Workers.
@@ -736,11 +736,11 @@ TEST_P(JobStoreConformance, OnlyBlobsThatNobodyElseHasVanish) {
   ASSERT_TRUE(store().CreateReconstruction({"abbey", "{}", Digest('1')}, kNow).ok());
   AssignJobs("castle", 2);
   AssignJobs("abbey", 2);
-  EXPECT_TRUE(*store().HoldBlob("castle", Digest('p')));
-  EXPECT_TRUE(*store().HoldBlob("castle", Digest('p')));
-  EXPECT_TRUE(*store().HoldBlob("castle", Digest('q')));
-  EXPECT_TRUE(*store().HoldBlob("abbey", Digest('q')));
-  EXPECT_TRUE(absl::IsNotFound(store().HoldBlob("ruin", Digest('q')).status()));
+  EXPECT_TRUE(*store().AddBlobRef("castle", Digest('p')));
+  EXPECT_TRUE(*store().AddBlobRef("castle", Digest('p')));
+  EXPECT_TRUE(*store().AddBlobRef("castle", Digest('q')));
+  EXPECT_TRUE(*store().AddBlobRef("abbey", Digest('q')));
+  EXPECT_TRUE(absl::IsNotFound(store().AddBlobRef("ruin", Digest('q')).status()));
   ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
   ASSERT_TRUE(store().CompleteCameraJob("castle", 2, 1, Digest('b'), {}, "{}", kNow).ok());
   ASSERT_TRUE(store().CompleteCameraJob("abbey", 1, 1, Digest('b'), {}, "{}", kNow).ok());
@@ -750,15 +750,15 @@ TEST_P(JobStoreConformance, OnlyBlobsThatNobodyElseHasVanish) {
   ASSERT_TRUE(store().BeginDeletion("castle").ok());
   EXPECT_TRUE(store().BeginDeletion("castle").ok());
   EXPECT_EQ(store().ListReconstructions()->size(), 1);
-  EXPECT_THAT(*store().LetBlobsVanish("castle"), testing::ElementsAre(Digest('a'), Digest('c'), Digest('p')));
+  EXPECT_THAT(*store().MarkBlobsForDeletion("castle"), testing::ElementsAre(Digest('a'), Digest('c'), Digest('p')));
   // Nobody may put one of them now; once they are gone they may come back.
-  EXPECT_FALSE(*store().HoldBlob("abbey", Digest('p')));
-  EXPECT_THAT(*store().LetBlobsVanish("castle"), testing::ElementsAre(Digest('a'), Digest('c')));
+  EXPECT_FALSE(*store().AddBlobRef("abbey", Digest('p')));
+  EXPECT_THAT(*store().MarkBlobsForDeletion("castle"), testing::ElementsAre(Digest('a'), Digest('c')));
   ASSERT_TRUE(store().DeleteReconstruction("castle").ok());
-  EXPECT_TRUE(*store().HoldBlob("abbey", Digest('p')));
+  EXPECT_TRUE(*store().AddBlobRef("abbey", Digest('p')));
   // The other one takes the rest along.
   ASSERT_TRUE(store().BeginDeletion("abbey").ok());
-  EXPECT_THAT(*store().LetBlobsVanish("abbey"),
+  EXPECT_THAT(*store().MarkBlobsForDeletion("abbey"),
               testing::ElementsAre(Digest('b'), Digest('d'), Digest('p'), Digest('q')));
 }
 

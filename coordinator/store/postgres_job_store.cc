@@ -107,9 +107,9 @@ class PostgresDatabase : public SqlDatabase {
 
   using Action = std::function<PostgresError(PostgresConnection&, absl::Time deadline)>;
 
-  // Runs the action until it succeeds, is refused, or patience ends.
+  // Runs the action until it succeeds, is refused, or retry_deadline ends.
   absl::Status Attempt(const Action& action) {
-    const absl::Time deadline = absl::Now() + options_.patience;
+    const absl::Time deadline = absl::Now() + options_.retry_deadline;
     std::unique_ptr<PostgresConnection> connection;
     if (!TakeTurn(deadline, &connection)) {
       return absl::UnavailableError(

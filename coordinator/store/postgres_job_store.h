@@ -14,7 +14,7 @@ namespace meshwright {
 struct PostgresOptions {
   int connections = 8;  // at most this many statements at once; connections are made when they are needed
   // How long one call waits for a server that is away (restarted, failing over) before it says Unavailable.
-  absl::Duration patience = absl::Seconds(30);
+  absl::Duration retry_deadline = absl::Seconds(30);
 };
 
 // The store of a cluster: a database of PostgreSQL 12 or newer, which several coordinators share (docs/adr/0008).

@@ -91,9 +91,9 @@ TEST_F(PostgresJobStoreTest, ADatabaseThatIsNotThereIsRefusedAtOnce) {
   EXPECT_LT(absl::Now() - start, absl::Seconds(10));
 }
 
-TEST_F(PostgresJobStoreTest, AServerThatIsNotThereIsUnavailableWhenPatienceEnds) {
+TEST_F(PostgresJobStoreTest, AServerThatIsNotThereIsUnavailableWhenTheRetryDeadlineEnds) {
   const auto store =
-      OpenPostgresJobStore("postgresql://me:secret@127.0.0.1:1/jobs", {.patience = absl::Milliseconds(300)});
+      OpenPostgresJobStore("postgresql://me:secret@127.0.0.1:1/jobs", {.retry_deadline = absl::Milliseconds(300)});
   EXPECT_TRUE(absl::IsUnavailable(store.status())) << store.status();
   EXPECT_THAT(store.status().ToString(), HasSubstr("127.0.0.1:1/jobs"));
   EXPECT_THAT(store.status().ToString(), Not(HasSubstr("secret")));

@@ -36,7 +36,7 @@ absl::StatusOr<Reconstruction> ReadReconstruction(const SqlRow& row) {
       .digest = row.Text(10), .bytes = row.Integer(11), .vertices = row.Integer(12), .faces = row.Integer(13)};
   reconstruction.progress = {.cameras_total = row.Integer(14),
                              .cameras_committed = row.Integer(15),
-                             .cameras_set_aside = row.Integer(16),
+                             .cameras_skipped = row.Integer(16),
                              .cameras_in_flight = row.Integer(17),
                              .patches_filtered = row.Integer(18),
                              .patches_accepted = row.Integer(19)};
@@ -73,7 +73,7 @@ SqlCall ProgressCall(const std::string& id, const StoredProgress& progress, int6
           {{"id", id},
            {"cameras_total", progress.cameras_total},
            {"cameras_committed", progress.cameras_committed},
-           {"cameras_set_aside", progress.cameras_set_aside},
+           {"cameras_set_aside", progress.cameras_skipped},
            {"cameras_in_flight", progress.cameras_in_flight},
            {"patches_filtered", progress.patches_filtered},
            {"patches_accepted", progress.patches_accepted},
@@ -117,8 +117,8 @@ SqlCall CompleteCall(const std::string& id, SequenceNumber sequence, int64_t epo
            {"now", absl::ToUnixMicros(now)}}};
 }
 
-SqlCall SetAsideCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason,
-                     bool out_of_memory, absl::Time now) {
+SqlCall SkipCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason,
+                 bool out_of_memory, absl::Time now) {
   return {"set_camera_job_aside",
           {{"id", id},
            {"sequence", sequence},
@@ -134,13 +134,13 @@ absl::StatusOr<CameraJob> ReadCameraJob(const SqlRow& row) {
   job.camera = static_cast<CameraIndex>(row.Integer(2));
   job.snapshot = static_cast<SequenceNumber>(row.Integer(3));
   job.state = row.Text(4) == "done"        ? CameraJobState::kDone
-              : row.Text(4) == "set_aside" ? CameraJobState::kSetAside
+              : row.Text(4) == "set_aside" ? CameraJobState::kSkipped
                                            : CameraJobState::kAssigned;
   job.epoch = row.Integer(5);
   job.filtered_digest = row.Text(6);
   MW_ASSIGN_OR_RETURN(job.weak_targets, SplitCameraIndices(row.Text(7)));
   job.report_json = row.Text(8);
-  job.set_aside_reason = row.Text(9);
+  job.skip_reason = row.Text(9);
   job.memory_bytes = row.Integer(10);
   job.failed_attempts = row.Integer(11);
   job.out_of_memory_failures = row.Integer(12);
@@ -290,13 +290,13 @@ absl::Status SqlJobStore::CompleteCameraJob(const std::string& id, SequenceNumbe
   return absl::FailedPreconditionError(absl::StrCat(CameraJobName(id, sequence), " has another result already"));
 }
 
-absl::Status SqlJobStore::SetCameraJobAside(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                            const std::string& reason, absl::Time now) {
-  const SqlCall call = SetAsideCall(id, sequence, epoch, reason, /*out_of_memory=*/false, now);
+absl::Status SqlJobStore::SkipCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
+                                        const std::string& reason, absl::Time now) {
+  const SqlCall call = SkipCall(id, sequence, epoch, reason, /*out_of_memory=*/false, now);
   MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(call.statement, call.parameters));
   if (result.changed == 1) return absl::OkStatus();
   MW_ASSIGN_OR_RETURN(const CameraJob job, GetFencedCameraJob(id, sequence, epoch));
-  if (job.state == CameraJobState::kSetAside) return absl::OkStatus();
+  if (job.state == CameraJobState::kSkipped) return absl::OkStatus();
   return absl::FailedPreconditionError(absl::StrCat(CameraJobName(id, sequence), " is done already"));
 }
 
@@ -340,7 +340,7 @@ absl::StatusOr<std::vector<JobResult>> SqlJobStore::ListResults(const std::strin
   results.reserve(result.rows.size());
   for (const SqlRow& row : result.rows) {
     JobResult one = {.sequence = static_cast<SequenceNumber>(row.Integer(0)),
-                     .set_aside = row.Text(1) == "set_aside",
+                     .skipped = row.Text(1) == "set_aside",
                      .epoch = row.Integer(2),
                      .filtered_digest = row.Text(3)};
     MW_ASSIGN_OR_RETURN(one.weak_targets, SplitCameraIndices(row.Text(4)));

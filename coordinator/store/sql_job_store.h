@@ -33,8 +33,8 @@ class SqlJobStore : public JobStore {
   absl::Status CompleteCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
                                  const std::string& filtered_digest, const std::vector<CameraIndex>& weak_targets,
                                  const std::string& report_json, absl::Time now) override;
-  absl::Status SetCameraJobAside(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                 const std::string& reason, absl::Time now) override;
+  absl::Status SkipCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason,
+                             absl::Time now) override;
   absl::Status ReopenCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
                                const std::string& expected_digest, const std::string& reason, absl::Time retry_at,
                                int64_t conductor_epoch) override;
@@ -63,8 +63,8 @@ class SqlJobStore : public JobStore {
   absl::Status RemoveSilentWorkers(absl::Time before) override;
   absl::Status PutSceneFile(const std::string& id, const SceneFile& file) override;
   absl::StatusOr<std::vector<SceneFile>> ListSceneFiles(const std::string& id) override;
-  absl::StatusOr<bool> HoldBlob(const std::string& id, const std::string& digest) override;
-  absl::StatusOr<std::vector<std::string>> LetBlobsVanish(const std::string& id) override;
+  absl::StatusOr<bool> AddBlobRef(const std::string& id, const std::string& digest) override;
+  absl::StatusOr<std::vector<std::string>> MarkBlobsForDeletion(const std::string& id) override;
   absl::Status ReportDamagedBlob(const std::string& id, const std::string& digest) override;
   absl::StatusOr<std::vector<std::string>> ListDamagedBlobs(const std::string& id) override;
   absl::Status ForgetDamagedBlob(const std::string& id, const std::string& digest) override;
@@ -85,7 +85,7 @@ std::string CameraJobName(const std::string& id, SequenceNumber sequence);
 absl::StatusOr<ReconstructionState> ReadReconstructionState(const std::string& text);
 SqlCall CompleteCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& filtered_digest,
                      const std::vector<CameraIndex>& weak_targets, const std::string& report_json, absl::Time now);
-SqlCall SetAsideCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason,
-                     bool out_of_memory, absl::Time now);
+SqlCall SkipCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason,
+                 bool out_of_memory, absl::Time now);
 
 }  // namespace meshwright

@@ -31,7 +31,7 @@ absl::StatusOr<std::vector<SceneFile>> SqlJobStore::ListSceneFiles(const std::st
   return files;
 }
 
-absl::StatusOr<bool> SqlJobStore::HoldBlob(const std::string& id, const std::string& digest) {
+absl::StatusOr<bool> SqlJobStore::AddBlobRef(const std::string& id, const std::string& digest) {
   MW_ASSIGN_OR_RETURN(const SqlResult held, database_->Run("hold_blob", {{"id", id}, {"digest", digest}}));
   if (held.changed == 0) MW_RETURN_IF_ERROR(GetReconstruction(id).status());
   // After the row is there, and only then: who deletes marks the blob first and looks for rows then, so that one of
@@ -40,7 +40,7 @@ absl::StatusOr<bool> SqlJobStore::HoldBlob(const std::string& id, const std::str
   return vanishing.rows.empty();
 }
 
-absl::StatusOr<std::vector<std::string>> SqlJobStore::LetBlobsVanish(const std::string& id) {
+absl::StatusOr<std::vector<std::string>> SqlJobStore::MarkBlobsForDeletion(const std::string& id) {
   MW_RETURN_IF_ERROR(database_->Run("let_blobs_vanish", {{"id", id}}).status());
   MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run("list_vanishing_blobs", {{"id", id}}));
   return FirstColumn(result);

@@ -26,8 +26,8 @@ SqlCall ChangeCall(const JobChange& change, absl::Time now) {
     case JobChange::Kind::kComplete:
       return CompleteCall(change.id, change.sequence, change.epoch, change.filtered_digest, change.weak_targets,
                           change.report_json, now);
-    case JobChange::Kind::kSetAside:
-      return SetAsideCall(change.id, change.sequence, change.epoch, change.reason, change.out_of_memory, now);
+    case JobChange::Kind::kSkipped:
+      return SkipCall(change.id, change.sequence, change.epoch, change.reason, change.out_of_memory, now);
     case JobChange::Kind::kRelease:
       return with("release_lease", {{"worker", change.worker},
                                     {"retry_at", absl::ToUnixMicros(change.retry_at)},
@@ -143,7 +143,8 @@ absl::StatusOr<std::vector<Attempt>> SqlJobStore::ListAttempts(const std::string
                         .worker = row.Text(3),
                         .began_at = row.Time(4),
                         .ended_at = row.Time(5),
-                        .ending = row.Text(6),
+                        // Rows keep the word of the first schema.
+                        .ending = row.Text(6) == "given_back" ? "released" : row.Text(6),
                         .reason = row.Text(7)});
   }
   return attempts;

@@ -29,7 +29,7 @@ WorkerSums Sum(const v1::ListWorkersResponse& response) {
   return sums;
 }
 
-void AddJobGauges(Metrics& metrics, SqlDatabase& database, const WorkerLogic& workers) {
+void AddJobGauges(Metrics& metrics, SqlDatabase& database, const WorkerService& workers) {
   auto& waiting = metrics.Gauge("meshwright_jobs_waiting", "Camera jobs that no worker holds: the depth of the queue.");
   auto& leased = metrics.Gauge("meshwright_jobs_leased", "Camera jobs that workers hold.");
   auto& known = metrics.Gauge("meshwright_workers", "Workers that were heard of lately.");
@@ -88,7 +88,7 @@ void AddDiskGauges(Metrics& metrics, const std::string& folder) {
 
 }  // namespace
 
-void AddClusterGauges(Metrics& metrics, SqlDatabase& database, const WorkerLogic& workers,
+void AddClusterGauges(Metrics& metrics, SqlDatabase& database, const WorkerService& workers,
                       const std::string& data_folder) {
   AddJobGauges(metrics, database, workers);
   AddReconstructionGauges(metrics, database);

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "common/telemetry/metrics.h"
-#include "coordinator/api/worker_logic.h"
+#include "coordinator/dispatch/worker_service.h"
 #include "coordinator/store/sql_database.h"
 
 namespace meshwright {
@@ -12,7 +12,7 @@ namespace meshwright {
 // reconstructions by state, the longest time without a commit, workers with their cores; and the disk below
 // `data_folder`. Several coordinators of one store all say the same: take the largest, not the sum. What cannot be
 // asked for keeps its last value. All of it outlives the last scrape.
-void AddClusterGauges(Metrics& metrics, SqlDatabase& database, const WorkerLogic& workers,
+void AddClusterGauges(Metrics& metrics, SqlDatabase& database, const WorkerService& workers,
                       const std::string& data_folder);
 
 }  // namespace meshwright

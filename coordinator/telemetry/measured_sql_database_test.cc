@@ -36,7 +36,7 @@ class MeasuredStoreTest : public testing::Test {
     });
     ASSERT_TRUE(store.ok()) << store.status();
     store_ = *std::move(store);
-    workers_ = std::make_unique<WorkerLogic>(LeaseOptions(), RetryOptions(), *store_);
+    workers_ = std::make_unique<WorkerService>(LeaseOptions(), RetryOptions(), *store_);
     AddClusterGauges(metrics_, *database_, *workers_, folder_);
     ASSERT_TRUE(store_
                     ->CreateReconstruction({.id = "r", .options_json = "{}", .scene_digest = std::string(64, 'a')},
@@ -72,7 +72,7 @@ class MeasuredStoreTest : public testing::Test {
   std::vector<std::string> lines_;
   SqlDatabase* database_ = nullptr;
   std::unique_ptr<JobStore> store_;
-  std::unique_ptr<WorkerLogic> workers_;
+  std::unique_ptr<WorkerService> workers_;
 };
 
 TEST_F(MeasuredStoreTest, LeasesAreCountedByHowTheyEnd) {
@@ -89,7 +89,7 @@ TEST_F(MeasuredStoreTest, LeasesAreCountedByHowTheyEnd) {
   ASSERT_TRUE(store_->CompleteCameraJob("r", 1, epoch, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
   ExpectLine("meshwright_leases_granted_total 4");
   ExpectLine("meshwright_leases_renewed_total 1");
-  for (const char* const outcome : {"finished", "failed", "given_back", "lost"}) {
+  for (const char* const outcome : {"finished", "failed", "released", "lost"}) {
     ExpectLine(std::string("meshwright_leases_ended_total{outcome=\"") + outcome + "\"} 1");
   }
   EXPECT_THAT(metrics_.Text(), Not(HasSubstr("meshwright_store_errors_total{")));
@@ -101,7 +101,7 @@ TEST_F(MeasuredStoreTest, CommitsBringAcceptedRaysAlsoInTransactions) {
     ASSERT_TRUE(store_->CompleteCameraJob("r", sequence, 1, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
   }
   Assign(3);
-  ASSERT_TRUE(store_->SetCameraJobAside("r", 3, 1, "failed too often", clock_.Now()).ok());
+  ASSERT_TRUE(store_->SkipCameraJob("r", 3, 1, "failed too often", clock_.Now()).ok());
   const std::string accepted(64, 'c');
   const auto commit = [&](SequenceNumber sequence, int64_t patches) {
     return Commit{.sequence = sequence,
@@ -118,7 +118,7 @@ TEST_F(MeasuredStoreTest, CommitsBringAcceptedRaysAlsoInTransactions) {
           .ok());
   ExpectLine("meshwright_commits_total 3");
   ExpectLine("meshwright_rays_accepted_total 120");
-  ExpectLine("meshwright_cameras_set_aside_total 1");
+  ExpectLine("meshwright_cameras_skipped_total 1");
   ExpectLine("meshwright_jobs_waiting 1");
 }
 
@@ -179,7 +179,7 @@ TEST(MeasuredPostgresTest, CountsAndGaugesAreThose) {
     return measured;
   });
   ASSERT_TRUE(store.ok()) << store.status();
-  const WorkerLogic workers(LeaseOptions(), RetryOptions(), **store);
+  const WorkerService workers(LeaseOptions(), RetryOptions(), **store);
   AddClusterGauges(metrics, *database, workers, "/");
   const absl::Time now = clock.Now();
   ASSERT_TRUE((*store)

@@ -6,7 +6,7 @@ root=${1:-$(cd "$here/../.." && pwd)}
 
 cd "$root"
 folders=()
-for folder in common worker coordinator cli tests dashboard; do
+for folder in common worker coordinator pipeline tools clients cli tests; do
   if [[ -d $folder ]]; then folders+=("$folder"); fi
 done
 find "${folders[@]}" -type f \( -name '*.h' -o -name '*.cc' \) | LC_ALL=C sort |

@@ -4,7 +4,7 @@ set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 tree=$(mktemp -d)
 trap 'rm -rf "$tree"' EXIT
-mkdir -p "$tree/worker/growing" "$tree/coordinator/store" "$tree/common/base" "$tree/cli/local"
+mkdir -p "$tree/worker/growing" "$tree/coordinator/store" "$tree/common/base" "$tree/pipeline/local"
 
 expect() {  # expect pass|fail WHAT
   if "$here/check_includes.sh" "$tree" >"$tree/log" 2>&1; then verdict=pass; else verdict=fail; fi
@@ -34,13 +34,13 @@ rm "$tree/common/base/a.h"
 plant worker/growing/a.h b.h
 expect fail "an include that is not rooted at the repository"
 plant worker/growing/a.h common/base/check.h
-plant worker/growing/a_test.cc common/synthetic/scene.h
+plant worker/growing/a_test.cc tools/synthetic/scene.h
 expect pass "a test that uses the synthetic world"
 plant worker/growing/a_test.cc coordinator/store/job_store.h
 expect fail "a worker's test that includes a coordinator room"
 rm "$tree/worker/growing/a_test.cc"
-plant cli/local/a.h worker/growing/a.h
-expect pass "cli/local, which links both"
+plant pipeline/local/a.h worker/growing/a.h
+expect pass "pipeline/local, which links both"
 mkdir "$tree/common/util"
 plant common/util/a.h common/base/check.h
 expect fail "a folder that is no room"

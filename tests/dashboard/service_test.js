@@ -11,7 +11,7 @@ import { DIST, keepScreenshot, launch, looksOfCanvas, meshNumbers, openPage, unt
 
 const MESHWRIGHT =
   process.env.MESHWRIGHT ?? fileURLToPath(new URL('../../build/release/bin/meshwright', import.meta.url));
-const PATIENCE = { timeout: 240_000 };
+const TIMEOUT = { timeout: 240_000 };
 
 let browser;
 let folder;
@@ -55,7 +55,7 @@ async function submit(page, name, options = []) {
     await page.locator(`#option-${option}`).fill(value);
   }
   await page.getByRole('button', { name: 'Submit', exact: true }).click();
-  await page.getByRole('heading', { name }).waitFor(PATIENCE);
+  await page.getByRole('heading', { name }).waitFor(TIMEOUT);
 }
 
 const stateOf = (page) => page.locator('.page-head .badge').first().textContent();
@@ -65,7 +65,7 @@ test('from a dropped folder to the downloaded mesh', { timeout: 600_000 }, async
   await submit(page, 'facade', [['Joining', 'min-component', '50']]);
 
   // While it runs: progress moves, the mesh grows, by numbers and by pixels.
-  await until(async () => (await meshNumbers(page)).shown > 0, PATIENCE);
+  await until(async () => (await meshNumbers(page)).shown > 0, TIMEOUT);
   // The surface alone, from a place that stays.
   await page.locator('.stage canvas').focus();
   for (const key of ['c', 'ArrowLeft', 'ArrowRight']) await page.keyboard.press(key);
@@ -76,7 +76,7 @@ test('from a dropped folder to the downloaded mesh', { timeout: 600_000 }, async
       seen.push({ ...numbers, ...(await looksOfCanvas(page)) });
     if (seen.length === 2) await keepScreenshot(page, 'service-growing', { fullPage: true });
     return (await stateOf(page)) === 'Done';
-  }, PATIENCE);
+  }, TIMEOUT);
   console.log(
     `# parts seen: ${seen.map(({ parts }) => parts).join(' ')}; faces: ${seen.map(({ faces }) => faces).join(' ')}`,
   );
@@ -127,7 +127,7 @@ test('another one is cancelled from the page', { timeout: 300_000 }, async (t) =
   await submit(page, 'unwanted');
   await page.getByRole('button', { name: 'Cancel', exact: true }).click();
   await page.getByRole('button', { name: 'Cancel it' }).click();
-  await page.locator('.badge', { hasText: 'Cancelled' }).waitFor(PATIENCE);
+  await page.locator('.badge', { hasText: 'Cancelled' }).waitFor(TIMEOUT);
   const { state } = await (await fetch(`${base}v1/reconstructions/unwanted`)).json();
   assert.equal(state, 'RECONSTRUCTION_STATE_CANCELLED');
   await page.goto(`${base}#/workers`);

@@ -47,7 +47,7 @@ std::string RunningService::WaitForMesh(const std::string& id) const {
   const RunResult watched = Client({"watch", id, "--json"});
   EXPECT_EQ(watched.exit_code, 0) << watched.err << watched.out;
   const nlohmann::json report = JsonOf(watched);
-  EXPECT_TRUE(report.is_object() && report["state"] == "done" && report["cameras"]["set_aside"] == 0) << watched.out;
+  EXPECT_TRUE(report.is_object() && report["state"] == "done" && report["cameras"]["skipped"] == 0) << watched.out;
   const std::string path = folder_ / (id + ".fetched.ply");
   const RunResult fetched = Client({"fetch", id, "-o", path});
   EXPECT_EQ(fetched.exit_code, 0) << fetched.err;

@@ -49,8 +49,8 @@ class MalformedCallsTest : public RestCluster {
     address.sin_port = htons(static_cast<uint16_t>(coordinator_->rest_port()));
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     MW_CHECK(::connect(descriptor, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0);
-    const timeval patience = {.tv_sec = 1, .tv_usec = 0};
-    ::setsockopt(descriptor, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    const timeval timeout = {.tv_sec = 1, .tv_usec = 0};
+    ::setsockopt(descriptor, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof(timeout));
     EXPECT_EQ(::send(descriptor, request.data(), request.size(), MSG_NOSIGNAL), static_cast<ssize_t>(request.size()));
     std::string answer;
     char piece[4096];
@@ -330,9 +330,9 @@ TEST_F(MalformedCallsTest, OverGrpc) {
       {"a worker without an instance", synchronize([](auto& r) { r.set_instance(""); }), kInvalid, "instance"},
       {"a worker without cores", synchronize([](auto& r) { r.set_cores(0); }), kInvalid, "cores"},
       {"a worker without memory", synchronize([](auto& r) { r.set_memory_bytes(-5); }), kInvalid, "memory_bytes"},
-      {"endless patience",
-       synchronize([](auto& r) { r.set_patience_seconds(std::numeric_limits<double>::infinity()); }), kInvalid,
-       "patience_seconds"},
+      {"endless wait timeout",
+       synchronize([](auto& r) { r.set_wait_timeout_seconds(std::numeric_limits<double>::infinity()); }), kInvalid,
+       "wait_timeout_seconds"},
       {"a blob without a digest", put_blob(""), kInvalid, "digest"},
       {"a blob with another digest", put_blob(kSha), kInvalid, "digest"},
       {"a blob whose digest is a path", put_blob("../../../etc/passwd"), kInvalid, "digest"},

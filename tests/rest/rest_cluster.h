@@ -12,12 +12,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "cli/service/coordinator_program.h"
-#include "cli/service/worker_program.h"
+#include "tools/synthetic/synthetic_scene.h"
+
 #include "common/base/check.h"
 #include "common/base/digest.h"
 #include "common/base/files.h"
-#include "common/synthetic/synthetic_scene.h"
+#include "coordinator/main/coordinator_program.h"
+#include "worker/main/worker_program.h"
 
 // Last: it brings the macro _res of resolv.h, a name that Eigen uses.
 #include <httplib.h>

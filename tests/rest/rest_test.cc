@@ -241,7 +241,7 @@ TEST_F(RestTest, TheLogSaysWhatFailedAndWhy) {
   request.set_instance("1");
   request.set_cores(1);
   request.set_memory_bytes(int64_t{1} << 40);
-  request.set_patience_seconds(1);
+  request.set_wait_timeout_seconds(1);
   const auto first = channel->Synchronize(request);
   ASSERT_TRUE(first.ok()) << first.status();
   ASSERT_EQ(first->jobs_size(), 1);

@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kParts = 30'000;  // about 6 MB of events: more than the buffers of a connection take
 constexpr int kStreams = 24;
-constexpr int kPatienceSeconds = 2;
+constexpr int kIdleTimeoutSeconds = 2;
 constexpr char kId[] = "long";
 
 double ResidentMebibytes() {
@@ -67,15 +67,15 @@ class SlowClientsTest : public testing::Test {
     store_ = *OpenSqliteJobStore(folder_ / "state.sqlite");
     blobs_ = *FilesystemBlobStore::Open(folder_ / "blobs");
     Fill();
-    workers_ = std::make_unique<WorkerLogic>(LeaseOptions(), RetryOptions(), *store_);
-    logic_ = *ReconstructionLogic::Open(
+    workers_ = std::make_unique<WorkerService>(LeaseOptions(), RetryOptions(), *store_);
+    logic_ = *ReconstructionService::Open(
         {.data_folder = folder_ / "data"},
-        {.store = store_.get(), .blobs = blobs_.get(), .clock = &clock_, .pool = &pool_, .workers = workers_.get()});
+        {.store = store_.get(), .blobs = blobs_.get(), .clock = &clock_, .pool = &pool_}, *workers_);
     auto server =
         RestServer::Start({.listen = "127.0.0.1:0",
                            .folder = folder_ / "rest",
                            .max_event_streams = kStreams,
-                           .patience_seconds = kPatienceSeconds},
+                           .idle_timeout_seconds = kIdleTimeoutSeconds},
                           {.reconstructions = logic_.get(), .workers = workers_.get(), .blobs = blobs_.get()});
     ASSERT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
@@ -127,8 +127,8 @@ class SlowClientsTest : public testing::Test {
   ThreadPool pool_{1};
   std::unique_ptr<JobStore> store_;
   std::unique_ptr<BlobStore> blobs_;
-  std::unique_ptr<WorkerLogic> workers_;
-  std::unique_ptr<ReconstructionLogic> logic_;
+  std::unique_ptr<WorkerService> workers_;
+  std::unique_ptr<ReconstructionService> logic_;
   std::unique_ptr<RestServer> server_;
 };
 
@@ -147,13 +147,13 @@ TEST_F(SlowClientsTest, WhoDoesNotReadIsDroppedAndTakesNoMemory) {
   const double before = ResidentMebibytes();
   std::vector<std::unique_ptr<SilentClient>> silent;
   for (int i = 0; i < kStreams; ++i) silent.push_back(std::make_unique<SilentClient>(server_->port()));
-  // All places are taken as long as the server has patience, and then free, though nobody went away.
+  // All places are taken until the idle timeout, and then free, though nobody went away.
   const auto begun = std::chrono::steady_clock::now();
   ReadAll(&status);
   EXPECT_EQ(status, 503);
   std::string again;
   double most = 0;
-  while (again.empty() && std::chrono::steady_clock::now() - begun < std::chrono::seconds(5 * kPatienceSeconds)) {
+  while (again.empty() && std::chrono::steady_clock::now() - begun < std::chrono::seconds(5 * kIdleTimeoutSeconds)) {
     most = std::max(most, ResidentMebibytes());
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     again = ReadAll(&status);

@@ -20,7 +20,7 @@ FakeWorkerFigures FakeWorker::Run() {
   request.set_memory_bytes(int64_t{1} << 30);
   while (!stopping_) {
     const bool brings_result = request.held_size() > 0;
-    request.set_patience_seconds(brings_result ? 0 : 5);
+    request.set_wait_timeout_seconds(brings_result ? 0 : 5);
     const absl::Time asked = absl::Now();
     const absl::StatusOr<v1::SynchronizeResponse> answer = channel_.Synchronize(request);
     if (!answer.ok()) {

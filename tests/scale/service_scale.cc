@@ -16,7 +16,8 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "cli/service/service_client.h"
+#include "clients/cpp/service_client.h"
+
 #include "common/base/check.h"
 #include "common/blob/filesystem_blob_store.h"
 #include "coordinator/store/postgres_testing.h"
@@ -134,8 +135,7 @@ int Measure(const Settings& settings) {
       MW_CHECK(now.ok());
       MW_CHECK(now->state() != v1::RECONSTRUCTION_STATE_FAILED);
       committed += now->progress().cameras_committed();
-      if (now->progress().cameras_committed() + now->progress().cameras_set_aside() >=
-          now->progress().cameras_total()) {
+      if (now->progress().cameras_committed() + now->progress().cameras_skipped() >= now->progress().cameras_total()) {
         ended.try_emplace(name_of(i), absl::ToDoubleSeconds(absl::Now() - begun));
       }
     }

@@ -17,13 +17,13 @@
 namespace meshwright {
 namespace {
 
-constexpr double kPatienceSeconds = 10;
-constexpr double kDrainingPatienceSeconds = 0.5;
+constexpr double kWaitTimeoutSeconds = 10;
+constexpr double kDrainingWaitTimeoutSeconds = 0.5;
 constexpr std::chrono::milliseconds kFirstRetry(200);
 constexpr std::chrono::milliseconds kLastRetry(5000);
 constexpr int64_t kCacheShare = 8;
-constexpr absl::Duration kFirstRest = absl::Seconds(2);
-constexpr absl::Duration kLastRest = absl::Minutes(2);
+constexpr absl::Duration kMinBackoff = absl::Seconds(2);
+constexpr absl::Duration kMaxBackoff = absl::Minutes(2);
 
 std::string DrawInstance() {
   std::random_device random;
@@ -66,7 +66,7 @@ absl::StatusOr<CameraJobSpec> ToSpec(const v1::CameraJob& job, size_t cameras) {
 
 }  // namespace
 
-Agent::Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, ParseJobMethod parse, AgentJob job,
+Agent::Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, JobConfigParser parse, AgentJob job,
              Logger log)
     : options_(options),
       instance_(DrawInstance()),
@@ -108,15 +108,15 @@ v1::SynchronizeRequest Agent::NextRequest() {
       continue;
     }
     if (held.running && now >= drain_until_) {
-      held.told.mutable_given_back();
+      held.told.mutable_released();
     } else if (held.running) {
       held.told.mutable_running()->set_seconds(absl::ToDoubleSeconds(now - held.begun));
     }
     *request.add_held() = held.told;
   }
   request.set_cores(std::max(1, options_.cores - lost_cores));
-  request.set_draining(draining_ || now < resting_until_ || lost_cores >= options_.cores);
-  request.set_patience_seconds(request.draining() ? kDrainingPatienceSeconds : kPatienceSeconds);
+  request.set_draining(draining_ || now < backoff_until_ || lost_cores >= options_.cores);
+  request.set_wait_timeout_seconds(request.draining() ? kDrainingWaitTimeoutSeconds : kWaitTimeoutSeconds);
   return request;
 }
 
@@ -167,9 +167,9 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
   }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (told.has_finished()) troubles_ = 0;
+    if (told.has_finished()) failures_ = 0;
     if (told.has_failed() && told.failed().infrastructure()) {
-      resting_until_ = absl::Now() + std::min(kLastRest, kFirstRest * (int64_t{1} << std::min(troubles_++, 20)));
+      backoff_until_ = absl::Now() + std::min(kMaxBackoff, kMinBackoff * (int64_t{1} << std::min(failures_++, 20)));
     }
     Held& held = held_.at(key);
     held.told = std::move(told);
@@ -187,7 +187,7 @@ v1::HeldJob Agent::Process(const v1::CameraJob& job) {
                         contexts_.For(job.scene_digest(), job.options_json(), job.reduction()));
     MW_ASSIGN_OR_RETURN(const CameraJobSpec spec, ToSpec(job, context->cameras.size()));
     const CameraJobFunction function = [&](const CameraJobInput& input, ThreadPool& pool) {
-      return job_(input, context->method.job, pool);
+      return job_(input, context->config.job, pool);
     };
     return RunJob(context->scene, spec, *context->inputs, function, blobs_, pool_);
   };

@@ -28,7 +28,7 @@ struct AgentOptions {
   std::string version;
   int cores = 1;                             // jobs at the same time, and cores of all of them together
   int64_t memory_bytes = 1 << 30;            // what jobs may take together
-  absl::Duration drain = absl::Seconds(30);  // after Drain(), jobs may take so long before they are given back
+  absl::Duration drain = absl::Seconds(30);  // after Drain(), jobs may take so long before they are released
   // The process of this worker before this one was killed since memory ran out.
   bool ran_out_of_memory = false;
 };
@@ -41,14 +41,14 @@ using AgentJob = std::function<CameraJobResult(const CameraJobInput&, const Came
 class Agent {
  public:
   // `channel` and `blobs` outlive the agent. `log` is told of jobs begun, finished, failed and dropped.
-  Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, ParseJobMethod parse, AgentJob job,
+  Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, JobConfigParser parse, AgentJob job,
         Logger log);
   // Waits for jobs that still run.
   ~Agent();
 
   // Works until Drain() and what follows from it.
   void Run();
-  // From another thread: takes no new jobs; Run() returns once all that run are finished or given back.
+  // From another thread: takes no new jobs; Run() returns once all that run are finished or released.
   void Drain();
 
  private:
@@ -82,8 +82,8 @@ class Agent {
   bool draining_ = false;
   absl::Time drain_until_ = absl::InfiniteFuture();
   // A worker that cannot reach the blobs leaves the jobs to others for a while.
-  int troubles_ = 0;  // since the last job that finished
-  absl::Time resting_until_ = absl::InfinitePast();
+  int failures_ = 0;  // since the last job that finished
+  absl::Time backoff_until_ = absl::InfinitePast();
 };
 
 }  // namespace meshwright

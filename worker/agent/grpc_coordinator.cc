@@ -17,7 +17,7 @@ namespace {
 
 constexpr size_t kChunkBytes = size_t{256} << 10;
 constexpr int kMaxMessageBytes = 64 << 20;
-// Beyond the patience that a request asks for.
+// Added to the wait timeout that a request asks for.
 constexpr double kAnswerSeconds = 10;
 constexpr std::chrono::minutes kBlobDeadline(10);
 
@@ -33,8 +33,9 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
 
   absl::StatusOr<v1::SynchronizeResponse> Synchronize(const v1::SynchronizeRequest& request) override {
     grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(static_cast<int64_t>(
-                                                                1000 * (request.patience_seconds() + kAnswerSeconds))));
+    context.set_deadline(
+        std::chrono::system_clock::now() +
+        std::chrono::milliseconds(static_cast<int64_t>(1000 * (request.wait_timeout_seconds() + kAnswerSeconds))));
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (std::exchange(interrupted_, false)) return absl::CancelledError("interrupted");

@@ -1,6 +1,5 @@
 #include "worker/agent/job_contexts.h"
 
-#include <algorithm>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -13,18 +12,10 @@ namespace meshwright {
 namespace {
 
 constexpr size_t kMaxKept = 3;
-constexpr int kWidestLattice = 16;
 
 }  // namespace
 
-CameraJobOptions Reduced(CameraJobOptions options, int reduction) {
-  for (; reduction > 0 && options.lattice_step < kWidestLattice; --reduction) {
-    options.lattice_step = std::min(2 * options.lattice_step, kWidestLattice);
-  }
-  return options;
-}
-
-JobContexts::JobContexts(BlobStore& blobs, ParseJobMethod parse, int64_t cache_bytes)
+JobContexts::JobContexts(BlobStore& blobs, JobConfigParser parse, int64_t cache_bytes)
     : blobs_(blobs), parse_(std::move(parse)), cache_bytes_(cache_bytes) {}
 
 absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::For(const std::string& scene_digest,
@@ -46,11 +37,11 @@ absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::For(const std::st
 absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::Make(const std::string& scene_digest,
                                                                     const std::string& options_json, int reduction) {
   auto context = std::make_shared<JobContext>();
-  MW_ASSIGN_OR_RETURN(context->method, parse_(options_json));
-  context->method.job = Reduced(context->method.job, reduction);
+  MW_ASSIGN_OR_RETURN(context->config, parse_(options_json));
+  context->config.job = Reduced(context->config.job, reduction);
   MW_ASSIGN_OR_RETURN(const std::string bytes, blobs_.Get(scene_digest));
   MW_ASSIGN_OR_RETURN(context->scene, DecodeScene(bytes));
-  const int max_image_size = context->method.max_image_size;
+  const int max_image_size = context->config.max_image_size;
   for (const SceneView& view : context->scene.views) {
     context->cameras.push_back(UndistortedCamera(view, max_image_size));
   }
@@ -63,7 +54,7 @@ absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::Make(const std::s
   };
   context->views = std::make_unique<ViewCache>(load, cache_bytes_);
   context->inputs = std::make_unique<CameraJobInputMaker>(context->scene, context->cameras, *context->views, blobs_,
-                                                          context->method.job.lattice_step);
+                                                          context->config.job.lattice_step);
   return context;
 }
 

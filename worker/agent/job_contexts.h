@@ -18,20 +18,17 @@
 namespace meshwright {
 
 // What a reconstruction's options mean for a worker.
-struct JobMethod {
+struct JobConfig {
   int max_image_size = 0;  // px, 0: as they are
   CameraJobOptions job;
 };
-// What is left of the options when a job is made smaller after it ran out of memory: the lattice is spaced twice as
-// wide each time, up to the widest.
-CameraJobOptions Reduced(CameraJobOptions options, int reduction);
 
 // InvalidArgument names the option.
-using ParseJobMethod = std::function<absl::StatusOr<JobMethod>(const std::string& options_json)>;
+using JobConfigParser = std::function<absl::StatusOr<JobConfig>(const std::string& options_json)>;
 
 // What the jobs of one reconstruction share.
 struct JobContext {
-  JobMethod method;
+  JobConfig config;
   Scene scene;  // each image_path is the digest of the picture's blob
   std::vector<Camera> cameras;
   std::unique_ptr<ViewCache> views;
@@ -42,7 +39,7 @@ struct JobContext {
 class JobContexts {
  public:
   // `cache_bytes`: for decoded photographs that no job uses at the moment, of each reconstruction.
-  JobContexts(BlobStore& blobs, ParseJobMethod parse, int64_t cache_bytes);
+  JobContexts(BlobStore& blobs, JobConfigParser parse, int64_t cache_bytes);
 
   // Errors are the BlobStore's and the parser's.
   // `reduction`: how many times the jobs were made smaller; each doubles the spacing of the lattice.
@@ -58,7 +55,7 @@ class JobContexts {
     std::shared_ptr<const JobContext> context;
   };
   BlobStore& blobs_;
-  const ParseJobMethod parse_;
+  const JobConfigParser parse_;
   const int64_t cache_bytes_;
   std::mutex mutex_;
   std::list<Kept> kept_;  // the last one used first

@@ -12,6 +12,8 @@
 namespace meshwright {
 namespace {
 
+constexpr int kWidestLattice = 16;  // px
+
 class StageTimer {
  public:
   // Wall seconds since the last call or the construction.
@@ -117,6 +119,13 @@ int64_t EstimateCameraJobBytes(const Camera& reference, const CameraJobOptions& 
   constexpr int64_t kBytesPerPatch = 2 * sizeof(GrownPatch) + 64;
   constexpr int64_t kBytesPerNode = 64;
   return nodes * (kPatchesPerRay * kBytesPerPatch + kBytesPerNode);
+}
+
+CameraJobOptions Reduced(CameraJobOptions options, int reduction) {
+  for (; reduction > 0 && options.lattice_step < kWidestLattice; --reduction) {
+    options.lattice_step = std::min(2 * options.lattice_step, kWidestLattice);
+  }
+  return options;
 }
 
 }  // namespace meshwright

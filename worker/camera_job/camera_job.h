@@ -91,4 +91,8 @@ PatchScorer MakeScorer(const CameraJobInput& input, const PatchScorer::Options& 
 // Bytes that RunCameraJob will need at most beside its input, for a reference of this size.
 int64_t EstimateCameraJobBytes(const Camera& reference, const CameraJobOptions& options);
 
+// What is left of the options when a job is made smaller after it ran out of memory: the lattice is spaced twice as
+// wide each time, up to the widest.
+CameraJobOptions Reduced(CameraJobOptions options, int reduction);
+
 }  // namespace meshwright

@@ -199,7 +199,7 @@ std::vector<uint8_t> DecodeLabels(const TrwsProblem& problem, bool reversed) {
   return labels;
 }
 
-void PolishLabels(const TrwsProblem& problem, std::vector<uint8_t>& labels) {
+void RunIcm(const TrwsProblem& problem, std::vector<uint8_t>& labels) {
   constexpr int kMaxSweeps = 10;
   float costs[kMaxPatches];
   bool changed = true;

@@ -101,7 +101,7 @@ TrwsResult RunTrws(TrwsProblem& problem, const TrwsStopping& stopping, const std
 std::vector<uint8_t> DecodeLabels(const TrwsProblem& problem, bool reversed);
 
 // Changes single labels while that lowers the energy (iterated conditional modes).
-void PolishLabels(const TrwsProblem& problem, std::vector<uint8_t>& labels);
+void RunIcm(const TrwsProblem& problem, std::vector<uint8_t>& labels);
 
 double LabellingEnergy(const TrwsProblem& problem, const std::vector<uint8_t>& labels);
 

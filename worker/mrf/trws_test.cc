@@ -183,7 +183,7 @@ TEST(Trws, PolishingNeverRaisesTheEnergyAndEndsInALocalMinimum) {
   std::mt19937 random(15);
   Pair pair = MakeRandomPair(15, 15, 3, 0.4, random);
   std::vector<uint8_t> labels(pair.problem.node_count(), 0);
-  PolishLabels(pair.problem, labels);
+  RunIcm(pair.problem, labels);
   const double energy = LabellingEnergy(pair.problem, labels);
   EXPECT_LE(energy, 0.0);
   for (int s = 0; s < pair.problem.node_count(); ++s) {

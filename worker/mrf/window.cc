@@ -112,7 +112,7 @@ std::vector<uint8_t> BestLabelling(const TrwsProblem& problem) {
   double best_energy = 0.0;
   for (const bool reversed : {false, true}) {
     std::vector<uint8_t> labels = DecodeLabels(problem, reversed);
-    PolishLabels(problem, labels);
+    RunIcm(problem, labels);
     const double energy = LabellingEnergy(problem, labels);
     if (energy < best_energy) {
       best_energy = energy;

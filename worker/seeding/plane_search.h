@@ -53,9 +53,9 @@ struct ScoredPlane {
 // w's, in half-pixel steps.
 ScoredPlane SearchDepth(const PatchObjective& objective, float w, const RelativeSlope& slope, int reach);
 
-// Ascends the objective by turns in inverse depth and both slopes, stepping to the peak of the parabola through three
-// scores; steps halve from round to round. `first_step`: of inverse depth, px in the fastest target; slopes' steps go
-// with it. Never returns worse than it was given.
+// Ascends the objective alternately in inverse depth and both slopes, stepping to the peak of the parabola through
+// three scores; steps halve from round to round. `first_step`: of inverse depth, px in the fastest target; slopes'
+// steps go with it. Never returns worse than it was given.
 ScoredPlane RefinePlane(const PatchObjective& objective, const ScoredPlane& start, float first_step, int rounds);
 
 }  // namespace meshwright

@@ -9,7 +9,7 @@
 namespace meshwright {
 namespace {
 
-// The coordinator answers within its patience of some ten seconds even when there is nothing to say.
+// The coordinator answers within its wait timeout of some ten seconds even when there is nothing to say.
 constexpr absl::Duration kSilence = absl::Minutes(1);
 
 const std::vector<double>& JobSecondsBounds() {
@@ -50,7 +50,7 @@ MeasuredWorkerChannel::MeasuredWorkerChannel(WorkerChannel& channel, Metrics& me
       draining_(metrics.Gauge("meshwright_worker_draining", "1 when no new jobs are taken.")),
       job_seconds_(metrics.Histogram("meshwright_camera_job_seconds", "Camera jobs that were finished, all stages.",
                                      JobSecondsBounds())) {
-  for (const char* const outcome : {"finished", "failed", "failed_infrastructure", "given_back", "lost"}) Jobs(outcome);
+  for (const char* const outcome : {"finished", "failed", "failed_infrastructure", "released", "lost"}) Jobs(outcome);
   for (const ReportedCount& count : kReportedCounts) metrics_.Counter(count.metric, count.help);
 }
 
@@ -108,8 +108,8 @@ void MeasuredWorkerChannel::CountOutcomes(const v1::SynchronizeRequest& request)
       CountFinished(held.finished());
     } else if (held.has_failed()) {
       Jobs(held.failed().infrastructure() ? "failed_infrastructure" : "failed").Increment();
-    } else if (held.has_given_back()) {
-      Jobs("given_back").Increment();
+    } else if (held.has_released()) {
+      Jobs("released").Increment();
     }
   }
   std::erase_if(counted_, [&](const Key& key) { return told.count(key) == 0; });

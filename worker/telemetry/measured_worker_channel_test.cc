@@ -80,12 +80,12 @@ TEST_F(MeasuredWorkerChannelTest, AFinishedJobCountsOnceHoweverOftenItIsTold) {
 TEST_F(MeasuredWorkerChannelTest, OutcomesAreKeptApart) {
   Hold(1).mutable_failed()->set_reason("a photograph cannot be read");
   Hold(2).mutable_failed()->set_infrastructure(true);
-  Hold(3).mutable_given_back();
+  Hold(3).mutable_released();
   Hold(4).mutable_running();
   Hold(5).mutable_running();
   coordinator_.answer = Jobs({5});  // 4 belongs to somebody else now
   Synchronize();
-  for (const char* const outcome : {"failed", "failed_infrastructure", "given_back", "lost"}) {
+  for (const char* const outcome : {"failed", "failed_infrastructure", "released", "lost"}) {
     ExpectLine(std::string("meshwright_camera_jobs_total{outcome=\"") + outcome + "\"} 1");
   }
   ExpectLine("meshwright_camera_jobs_total{outcome=\"finished\"} 0");

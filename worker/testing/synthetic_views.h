@@ -3,9 +3,10 @@
 #include <memory>
 #include <vector>
 
+#include "tools/raycast/depth_map.h"
+#include "tools/synthetic/synthetic_scene.h"
+
 #include "common/base/thread_pool.h"
-#include "common/raycast/depth_map.h"
-#include "common/synthetic/synthetic_scene.h"
 #include "worker/photo_consistency/patch_scorer.h"
 #include "worker/seeding/seeding.h"
 #include "worker/visibility/accepted_depth.h"

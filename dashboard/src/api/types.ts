@@ -6,7 +6,7 @@ export type ReconstructionState = 'CREATED' | 'PREPARING' | 'RUNNING' | 'JOINING
 export interface Progress {
   camerasTotal?: number;
   camerasCommitted?: number;
-  camerasSetAside?: number;
+  camerasSkipped?: number;
   camerasInFlight?: number;
   jobsLeased?: number;
   patchesFiltered?: string;
@@ -30,7 +30,7 @@ export interface Reconstruction {
 }
 
 // Positions are the numbers in CameraTable.states.
-export const CAMERA_STATES = ['WAITING', 'ASSIGNED', 'DONE', 'COMMITTED', 'SET_ASIDE'] as const;
+export const CAMERA_STATES = ['WAITING', 'ASSIGNED', 'DONE', 'COMMITTED', 'SKIPPED'] as const;
 export type CameraState = (typeof CAMERA_STATES)[number];
 
 export interface Camera {
@@ -40,7 +40,7 @@ export interface Camera {
   sequence: number;
   filteredPatches?: string;
   acceptedPatches?: string;
-  setAsideReason?: string;
+  skipReason?: string;
   reportJson?: string;
   geometry: {
     width: number;
@@ -66,7 +66,7 @@ export interface Part {
 }
 
 // UNSPECIFIED: it runs.
-export const ATTEMPT_ENDINGS = ['UNSPECIFIED', 'FINISHED', 'FAILED', 'OUT_OF_MEMORY', 'LOST', 'GIVEN_BACK'] as const;
+export const ATTEMPT_ENDINGS = ['UNSPECIFIED', 'FINISHED', 'FAILED', 'OUT_OF_MEMORY', 'LOST', 'RELEASED'] as const;
 export type AttemptEnding = (typeof ATTEMPT_ENDINGS)[number];
 
 export interface Attempt {

@@ -22,7 +22,7 @@ const ENDINGS: Record<AttemptEnding, [words: string, color: string]> = {
   FAILED: ['failed', '--state-set-aside'],
   OUT_OF_MEMORY: ['out of memory', '--state-set-aside'],
   LOST: ['lease lost', '--state-lost'],
-  GIVEN_BACK: ['given back', '--state-waiting'],
+  RELEASED: ['released', '--state-waiting'],
 };
 
 const isTrouble = (ending: AttemptEnding) => ending === 'FAILED' || ending === 'OUT_OF_MEMORY' || ending === 'LOST';

@@ -13,7 +13,7 @@ const STATE_WORDS: Record<CameraState, string> = {
   ASSIGNED: 'under way',
   DONE: 'processed',
   COMMITTED: 'committed',
-  SET_ASIDE: 'set aside',
+  SKIPPED: 'skipped',
 };
 const STAGES = ['loading', 'visibility', 'seeding', 'growing', 'filtering', 'refinement'];
 
@@ -223,7 +223,7 @@ function CameraDetails({ store, table, selected, onSelect }: Props & { table: Ca
         {sequence > 0 && <span class="muted">, number {sequence} in the order</span>}
         {camera?.index === selected && camera.worker && <span class="muted">, {camera.worker}</span>}
       </p>
-      {camera?.index === selected && camera.setAsideReason && <Notice tone="danger">{camera.setAsideReason}</Notice>}
+      {camera?.index === selected && camera.skipReason && <Notice tone="danger">{camera.skipReason}</Notice>}
       <dl class="facts tight">
         {numbers.map(([key, value]) => (
           <div key={key}>

@@ -18,7 +18,7 @@ const COLORINGS = [
   ['plain', 'Shape'],
 ] as const;
 
-const STATE_WORDS = ['waiting', 'under way', 'processed', 'committed', 'set aside'] as const;
+const STATE_WORDS = ['waiting', 'under way', 'processed', 'committed', 'skipped'] as const;
 
 // A phone has less memory, and fewer pixels to see them with.
 const LARGEST_BUDGET = window.matchMedia('(max-width: 700px), (pointer: coarse)').matches ? 400_000 : 1_500_000;

@@ -45,8 +45,8 @@ function Summary({ store, reconstruction }: { store: ReconstructionStore; recons
         {!isOver(state) && (
           <Fact name="In flight" value={count(progress.camerasInFlight ?? 0)} title="Chosen and not yet committed" />
         )}
-        {(progress.camerasSetAside ?? 0) > 0 && (
-          <Fact name="Set aside" value={count(progress.camerasSetAside!)} title="Given up after repeated failures" />
+        {(progress.camerasSkipped ?? 0) > 0 && (
+          <Fact name="Skipped" value={count(progress.camerasSkipped!)} title="Given up after repeated failures" />
         )}
         <Fact
           name="Accepted"

@@ -34,7 +34,7 @@ function Row({ reconstruction, samples, now }: { reconstruction: Reconstruction;
         <div class="muted small list-numbers">
           <span>
             {count(progress?.camerasCommitted ?? 0)} of {count(total)} cameras
-            {(progress?.camerasSetAside ?? 0) > 0 && `, ${progress!.camerasSetAside} set aside`}
+            {(progress?.camerasSkipped ?? 0) > 0 && `, ${progress!.camerasSkipped} skipped`}
           </span>
           {left !== null && <span>about {duration(left)} left</span>}
           {isOver(state) && finish > start && <span>took {duration((finish - start) / 1000)}</span>}

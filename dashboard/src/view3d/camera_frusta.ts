@@ -9,7 +9,7 @@ const STATE_COLORS: Record<CameraState, number> = {
   ASSIGNED: 0xe8a317,
   DONE: 0x5b9bf3,
   COMMITTED: 0x22b07d,
-  SET_ASIDE: 0xe5484d,
+  SKIPPED: 0xe5484d,
 };
 const SELECTED_COLOR = 0xff4fd8;
 const EDGES: readonly (readonly [number, number])[] = [

@@ -15,16 +15,16 @@ const TYPES = {
   '.svg': 'image/svg+xml',
 };
 const OPTIONS = [
-  ['Method', 'max-image-size', 'integer', 0, { minimum: 0 }, 'longest side of the images used, px; 0: as they are'],
+  ['ReconstructionConfig', 'max-image-size', 'integer', 0, { minimum: 0 }, 'longest side of the images used, px; 0: as they are'],
   [
-    'Method',
+    'ReconstructionConfig',
     'lattice-step',
     'integer',
     2,
     { minimum: 1, maximum: 16 },
     "gamma: spacing of the reference camera's rays, px",
   ],
-  ['Method', 'window', 'integer', 4, { minimum: 1 }, 'W: cameras chosen and not yet committed at the same time'],
+  ['ReconstructionConfig', 'window', 'integer', 4, { minimum: 1 }, 'W: cameras chosen and not yet committed at the same time'],
   [
     'Seeds (3.5)',
     'min-seed-quality',

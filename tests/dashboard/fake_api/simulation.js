@@ -96,20 +96,20 @@ export class Simulation {
 
   // Fills the window, then ends and commits the first camera in flight.
   step() {
-    while (this.chosen < this.order.length && this.chosen - this.parts.length - this.setAside() < WINDOW) {
+    while (this.chosen < this.order.length && this.chosen - this.parts.length - this.skipped() < WINDOW) {
       const camera = this.cameras[this.order[this.chosen]];
       camera.sequence = ++this.chosen;
       camera.state = 'CAMERA_STATE_ASSIGNED';
       this.begin(camera);
     }
-    const next = this.parts.length + this.setAside();
+    const next = this.parts.length + this.skipped();
     if (next >= this.order.length) return false;
     const camera = this.cameras[this.order[next]];
     this.end(camera);
     return true;
   }
 
-  setAside() {
+  skipped() {
     return this.asideCount ?? 0;
   }
 
@@ -151,10 +151,10 @@ export class Simulation {
     }
     this.close(camera.attempt, 'FINISHED');
     if (draw(this.id, camera.index, 'aside') < 0.001) {
-      camera.state = 'CAMERA_STATE_SET_ASIDE';
-      camera.setAsideReason = 'failed three times: the photograph cannot be decoded';
-      this.asideCount = this.setAside() + 1;
-      this.say(this.now, 'error', `Set aside: ${camera.setAsideReason}`, {
+      camera.state = 'CAMERA_STATE_SKIPPED';
+      camera.skipReason = 'failed three times: the photograph cannot be decoded';
+      this.asideCount = this.skipped() + 1;
+      this.say(this.now, 'error', `Skipped: ${camera.skipReason}`, {
         camera: camera.index,
       });
       return;
@@ -243,9 +243,9 @@ export class Simulation {
       ...(this.finishTime ? { finishTime: new Date(this.finishTime).toISOString() } : {}),
       progress: {
         camerasTotal: this.order.length,
-        camerasCommitted: this.parts.length + this.setAside(),
-        camerasSetAside: this.setAside(),
-        camerasInFlight: this.state === 'RUNNING' ? this.chosen - this.parts.length - this.setAside() : 0,
+        camerasCommitted: this.parts.length + this.skipped(),
+        camerasSkipped: this.skipped(),
+        camerasInFlight: this.state === 'RUNNING' ? this.chosen - this.parts.length - this.skipped() : 0,
         jobsLeased: this.state === 'RUNNING' ? this.workers.length : 0,
         patchesFiltered: String(Math.round(patches * 1.18)),
         patchesAccepted: String(patches),

@@ -1,0 +1,25 @@
+#include "common/base/relative_path.h"
+
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
+
+namespace meshwright {
+namespace {
+
+constexpr size_t kMaxPathLength = 1024;
+
+}  // namespace
+
+absl::Status ValidateRelativePath(const std::string& path) {
+  bool valid = !path.empty() && path.size() <= kMaxPathLength && path.find('\0') == std::string::npos;
+  for (const std::string& part : std::vector<std::string>(absl::StrSplit(path, '/'))) {
+    valid = valid && !part.empty() && part != "." && part != "..";
+  }
+  if (valid) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("path \"", path.substr(0, 100), "\": a relative path inside the scene's folder expected"));
+}
+
+}  // namespace meshwright

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+
+#include <absl/status/status.h>
+
+namespace meshwright {
+
+// InvalidArgument (naming the field `path`) unless it is a relative path that stays inside: no "..", no empty part.
+absl::Status ValidateRelativePath(const std::string& path);
+
+}  // namespace meshwright

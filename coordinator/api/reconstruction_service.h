@@ -1,0 +1,102 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "meshwright/v1/reconstruction.pb.h"
+
+#include "coordinator/api/reconstruction_record.h"
+#include "coordinator/api/scene_upload.h"
+#include "coordinator/conductor/reconstruction_driver.h"
+#include "coordinator/dispatch/worker_service.h"
+
+namespace meshwright {
+
+struct ReconstructionServiceOptions {
+  std::string data_folder;               // uploads on their way, copies of meshes
+  std::vector<std::string> scene_roots;  // folders that scenes may be taken from by reference
+  // Names this coordinator among those that share the store: the same when it is started anew, so that it takes back
+  // what it conducted at once.
+  std::string name = "coordinator";
+  // Another coordinator takes over what this one conducts when it has been silent so long.
+  absl::Duration conductor_lease = absl::Seconds(5);
+};
+
+// The public interface without a network. All that it knows is in the JobStore and the BlobStore, so any coordinator
+// answers any call; a thread takes up reconstructions that nobody conducts. Thread-safe. Errors are as
+// reconstruction.proto says.
+class ReconstructionService {
+ public:
+  static absl::StatusOr<std::unique_ptr<ReconstructionService>> Open(const ReconstructionServiceOptions& options,
+                                                                     const DriverEnvironment& environment,
+                                                                     WorkerService& workers);
+  // Ends all of them after what they are doing at the moment.
+  ~ReconstructionService();
+
+  absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request);
+  absl::StatusOr<SceneFileUpload> BeginUpload(const v1::UploadSceneFileRequest::Header& header);
+  // What has been uploaded so far, by path.
+  absl::StatusOr<std::vector<SceneFile>> ListSceneFiles(const std::string& id) const;
+  absl::StatusOr<v1::Reconstruction> Start(const std::string& id);
+  absl::StatusOr<v1::Reconstruction> Get(const std::string& id) const;
+  absl::StatusOr<v1::ListReconstructionsResponse> List(const v1::ListReconstructionsRequest& request) const;
+  absl::StatusOr<v1::Reconstruction> Cancel(const std::string& id);
+  absl::Status Delete(const std::string& id);
+  absl::StatusOr<v1::ListCamerasResponse> ListCameras(const std::string& id) const;
+  // As it was taken: image_path of each view is the digest of its photograph's blob. FailedPrecondition before it was
+  // checked.
+  absl::StatusOr<Scene> LoadScene(const std::string& id) const;
+  absl::StatusOr<v1::GetIncidenceResponse> GetIncidence(const std::string& id) const;
+  // Those with a sequence greater than `after`.
+  absl::StatusOr<v1::ListPartsResponse> ListParts(const std::string& id, SequenceNumber after = 0) const;
+  absl::StatusOr<v1::Part> GetPart(const std::string& id, SequenceNumber sequence) const;
+  absl::StatusOr<v1::ListAttemptsResponse> ListAttempts(const v1::ListAttemptsRequest& request) const;
+  // The file to be read: this coordinator's copy of the mesh, there as long as the reconstruction is not deleted.
+  absl::StatusOr<std::string> MeshPath(const std::string& id) const;
+  absl::StatusOr<std::string> PartBytes(const std::string& id, SequenceNumber sequence) const;
+
+  // Calls `send` with what it is and again when it has changed, until it is over, `send` gives false or Shutdown().
+  absl::Status Watch(const std::string& id, const std::function<bool(const v1::Reconstruction&)>& send);
+  // Ends all Watch().
+  void Shutdown();
+
+ private:
+  ReconstructionService(const ReconstructionServiceOptions& options, const DriverEnvironment& environment,
+                        WorkerService& workers);
+
+  absl::StatusOr<Reconstruction> Find(const std::string& id) const;
+  v1::Reconstruction Describe(const Reconstruction& reconstruction) const;
+  absl::Status KeepUpload(const v1::UploadSceneFileRequest::Header& header, const std::string& local_path);
+  void StopConducting(const std::string& id);
+  void Changed(bool look);
+  void Oversee();
+  absl::Status OverseeOnce();
+  absl::Status TakeUp(const ConductedState& state, absl::Time now);
+
+  const ReconstructionServiceOptions options_;
+  const CoordinatorFolders folders_;
+  const DriverEnvironment environment_;
+  WorkerService& workers_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  int64_t version_ = 0;                                                     // grows when something may have changed
+  std::map<std::string, std::unique_ptr<ReconstructionDriver>> conducted_;  // here
+  bool look_ = false;                                                       // the overseer should look now
+  bool stopping_ = false;
+  std::condition_variable overseer_wake_;
+  std::thread overseer_;
+};
+
+// Whether nothing will change any more.
+bool IsOver(v1::ReconstructionState state);
+
+}  // namespace meshwright

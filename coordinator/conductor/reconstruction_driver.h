@@ -1,0 +1,106 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "common/base/clock.h"
+#include "common/base/thread_pool.h"
+#include "common/blob/blob_store.h"
+#include "common/scene/scene.h"
+#include "coordinator/conductor/conductor.h"
+#include "coordinator/conductor/reconstruction_config.h"
+#include "coordinator/conductor/referenced_blobs.h"
+#include "coordinator/conductor/scene_ingestion.h"
+#include "coordinator/store/job_store.h"
+
+namespace meshwright {
+
+// What all reconstructions of a coordinator share. Everything outlives them.
+struct DriverEnvironment {
+  JobStore* store = nullptr;
+  BlobStore* blobs = nullptr;
+  const Clock* clock = nullptr;
+  ThreadPool* pool = nullptr;          // acceptance and joining
+  std::function<void()> jobs_changed;  // there may be new jobs in the store
+  ParseReconstructionConfig parse_config;
+  int max_failures = 3;  // a camera whose job failed so often is skipped, >= 1
+};
+
+// Where a coordinator finds and puts files.
+struct CoordinatorFolders {
+  std::string data;                      // uploads on their way, and copies of meshes
+  std::vector<std::string> scene_roots;  // folders that scenes may be taken from by reference
+
+  std::string MeshFile(const std::string& digest) const { return data + "/meshes/" + digest + ".ply"; }
+};
+
+// One reconstruction from its scene to its mesh, or to its end when it is being deleted, on a thread of its own, so
+// that acceptance and joining keep nobody waiting. What it knows is in the JobStore, and what it writes there is fenced
+// by the epoch of its lease: it may end at any moment and another one goes on, here or elsewhere.
+class ReconstructionDriver {
+ public:
+  // `epoch`: of the conductor's lease. `is_deleting`: to be deleted, not conducted. `changed` is called when what the
+  // store says of it may have changed.
+  ReconstructionDriver(const DriverEnvironment& environment, const CoordinatorFolders& folders, std::string id,
+                       int64_t epoch, bool is_deleting, std::function<void(bool has_ended)> changed);
+  // Ends after what it is doing at the moment.
+  ~ReconstructionDriver();
+
+  void RequestStop();
+  // There may be results in the store.
+  void Wake();
+  // It has nothing to do any more, for whatever reason; its lease can go.
+  bool has_ended() const { return has_ended_; }
+  int64_t epoch() const { return epoch_; }
+  bool is_deleting() const { return is_deleting_; }
+
+ private:
+  void Run();
+  absl::Status Conduct();
+  absl::Status DeleteEverything();
+  absl::Status PrepareScene(const ReconstructionConfig& config);
+  absl::StatusOr<IngestedScene> Take();
+  absl::StatusOr<std::string> SceneFolder(bool* is_temporary);
+  absl::StatusOr<std::unique_ptr<Conductor>> OpenConductor(const ReconstructionConfig& config);
+  absl::Status RunJobs(Conductor& conductor);
+  absl::Status Join(const ReconstructionConfig& config, Conductor& conductor);
+  absl::StatusOr<StoredMesh> WriteMesh(const ReconstructionConfig& config, Conductor& conductor);
+  absl::Status LookAtReports(Conductor& conductor);
+  absl::Status Repair(Conductor& conductor, const std::string& digest);
+  absl::Status RunAgain(SequenceNumber sequence, const std::string& digest);
+  absl::Status SetState(ReconstructionState state, const std::string& reason = "");
+  bool WaitForNews();
+
+  const DriverEnvironment environment_;
+  const CoordinatorFolders folders_;
+  const std::string id_;
+  const int64_t epoch_;
+  const bool is_deleting_;
+  const std::function<void(bool has_ended)> changed_;
+
+  // Of the thread alone.
+  Reconstruction record_;
+  ReferencedBlobs referenced_blobs_;
+  std::vector<Camera> cameras_;
+  std::vector<SparsePoint> points_;
+  std::map<std::string, std::string> photographs_;  // digest -> name
+
+  std::atomic<bool> has_ended_{false};
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  bool has_news_ = false;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace meshwright

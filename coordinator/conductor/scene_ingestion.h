@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "common/base/thread_pool.h"
+#include "common/blob/blob_store.h"
+#include "coordinator/conductor/referenced_blobs.h"
+#include "coordinator/store/job_store.h"
+
+namespace meshwright {
+
+// The folder that "file:FOLDER" names: below the first of `roots` that has it, symbolic links followed. InvalidArgument
+// or NotFound names the field `scene_reference`.
+absl::StatusOr<std::string> ResolveSceneReference(const std::string& reference, const std::vector<std::string>& roots);
+
+struct IngestedScene {
+  std::string scene_digest;  // as of CheckAndDigestScene
+  std::string scene_blob;    // EncodeScene, with the digest of each picture's blob as its image_path
+};
+
+// Reads the scene in `folder`, checks every photograph and puts all of it into the BlobStore: from then on the folder
+// is not needed any more and nothing that happens to it changes the reconstruction. Errors of the scene are bad input.
+absl::StatusOr<IngestedScene> IngestScene(const std::string& folder, ReferencedBlobs& blobs, ThreadPool& pool);
+
+// Makes `folder` anew with the files of an upload. DataLoss names a file whose blob is damaged or lost.
+absl::Status MaterializeScene(const std::vector<SceneFile>& files, BlobStore& blobs, const std::string& folder);
+
+}  // namespace meshwright

@@ -1,0 +1,256 @@
+#include "coordinator/dispatch/scheduling_pass.h"
+
+#include <algorithm>
+
+#include <absl/strings/str_cat.h>
+#include <nlohmann/json.hpp>
+
+#include "common/blob/blob_store.h"
+
+namespace meshwright {
+namespace {
+
+// Renewing costs a write: done when a third of the lease is gone.
+constexpr double kRenewBelow = 2.0 / 3.0;
+
+absl::Duration DelayAfter(const RetryOptions& retry, int64_t attempt) {
+  const int64_t doublings = std::min<int64_t>(attempt - 1, 20);
+  return std::min(retry.backoff * (int64_t{1} << std::max<int64_t>(doublings, 0)), retry.max_backoff);
+}
+
+JobChange ChangeOf(JobChange::Kind kind, const OpenJob& job) {
+  return {.kind = kind,
+          .id = job.reconstruction_id,
+          .sequence = job.sequence,
+          .epoch = job.epoch,
+          .worker = job.lease_worker};
+}
+
+}  // namespace
+
+absl::Status LeaseOptions::Validate() const {
+  if (lease < absl::Milliseconds(100)) {
+    return absl::InvalidArgumentError(absl::StrCat("lease is ", absl::FormatDuration(lease), ", expected >= 0.1 s"));
+  }
+  if (job_time_limit < lease) {
+    return absl::InvalidArgumentError(absl::StrCat("job_time_limit is ", absl::FormatDuration(job_time_limit),
+                                                   ", expected at least the lease, ", absl::FormatDuration(lease)));
+  }
+  return absl::OkStatus();
+}
+
+SchedulingPass::SchedulingPass(const LeaseOptions& lease, const RetryOptions& retry, std::vector<OpenJob> open,
+                               absl::Time now, MemorySteps memory_steps)
+    : lease_(lease),
+      retry_(retry),
+      now_(now),
+      memory_steps_(std::move(memory_steps)),
+      jobs_(std::move(open)),
+      changed_(jobs_.size(), false) {
+  for (size_t i = 0; i < jobs_.size(); ++i) {
+    const OpenJob& job = jobs_[i];
+    by_name_[{job.reconstruction_id, job.sequence}] = i;
+    Share& share = shares_[job.reconstruction_id];
+    share.weight = job.weight;
+    if (job.lease_worker.empty()) {
+      share.waiting.push_back(i);
+    } else {
+      ++share.leases;
+      by_worker_[job.lease_worker].insert(i);
+    }
+  }
+}
+
+void SchedulingPass::Add(size_t job, JobChange change) {
+  changed_[job] = true;
+  const bool ends = change.kind != JobChange::Kind::kClaim && change.kind != JobChange::Kind::kRenew;
+  if (ends && !jobs_[job].lease_worker.empty()) {
+    by_worker_[jobs_[job].lease_worker].erase(job);
+    --shares_[jobs_[job].reconstruction_id].leases;
+  }
+  changes_.push_back({.change = std::move(change), .job = job});
+}
+
+JobChange SchedulingPass::FailureOf(const OpenJob& job, const std::string& reason, bool out_of_memory) const {
+  const int64_t failures = job.failed_attempts + 1;
+  JobChange change = ChangeOf(JobChange::Kind::kFail, job);
+  change.reason = reason;
+  change.out_of_memory = out_of_memory;
+  change.retry_at = now_ + DelayAfter(retry_, failures);
+  // What was done before is done again until it is there: its camera is committed and cannot be skipped any more.
+  if (job.is_repair) return change;
+  if (failures >= retry_.max_failures) {
+    change.kind = JobChange::Kind::kSkipped;
+    return change;
+  }
+  if (out_of_memory) {
+    const std::vector<int64_t> steps = memory_steps_(job);
+    const auto next = static_cast<size_t>(job.reduction + 1);
+    change.reduce = next < steps.size();
+    if (change.reduce) change.memory_bytes = steps[next];
+  }
+  return change;
+}
+
+JobChange SchedulingPass::LossOf(const OpenJob& job, const std::string& reason, bool out_of_memory) const {
+  if (out_of_memory) return FailureOf(job, reason, true);
+  const int64_t losses = job.losses + 1;
+  JobChange change = ChangeOf(JobChange::Kind::kLose, job);
+  change.reason = reason;
+  change.retry_at = losses == 1 ? now_ : now_ + DelayAfter(retry_, losses - 1);
+  if (losses >= retry_.max_losses && !job.is_repair) {
+    change.kind = JobChange::Kind::kSkipped;
+    change.reason = absl::StrCat("lost ", losses, " workers, the last one: ", reason);
+  }
+  return change;
+}
+
+bool SchedulingPass::ApplyReport(const v1::SynchronizeRequest& request) {
+  const std::set<size_t> held_before = by_worker_[request.worker_id()];
+  for (const size_t job : held_before) {
+    if (jobs_[job].lease_instance == request.instance() || changed_[job]) continue;
+    Add(job, LossOf(jobs_[job],
+                    absl::StrCat("worker ", request.worker_id(),
+                                 request.ran_out_of_memory() ? " ran out of memory" : " was started anew"),
+                    request.ran_out_of_memory()));
+  }
+  bool settled = false;
+  for (const v1::HeldJob& held : request.held()) {
+    ApplyHeldJob(request, held);
+    settled = settled || held.outcome_case() != v1::HeldJob::kRunning;
+  }
+  return settled;
+}
+
+void SchedulingPass::ApplyHeldJob(const v1::SynchronizeRequest& request, const v1::HeldJob& held) {
+  const auto found = by_name_.find({held.key().reconstruction_id(), held.key().sequence()});
+  if (found == by_name_.end()) return;
+  const size_t index = found->second;
+  const OpenJob& job = jobs_[index];
+  // Taken already, or somebody else has the job now.
+  if (job.epoch != held.key().epoch() || changed_[index]) return;
+  const bool is_leased = job.lease_worker == request.worker_id() && job.lease_instance == request.instance();
+  if (!is_leased && !job.lease_worker.empty()) return;
+  switch (held.outcome_case()) {
+    case v1::HeldJob::kFinished: {
+      // Also when the lease ran out and nobody has taken the job over.
+      const v1::HeldJob::Finished& finished = held.finished();
+      const bool is_report = nlohmann::json::accept(finished.report_json());
+      if (!ValidateDigest(finished.filtered_digest()).ok() || !is_report) {
+        if (is_leased) {
+          Add(index, FailureOf(job, is_report ? "filtered_digest: no digest" : "report_json: no JSON", false));
+        }
+        return;
+      }
+      JobChange change = ChangeOf(JobChange::Kind::kComplete, job);
+      change.filtered_digest = finished.filtered_digest();
+      change.weak_targets.assign(finished.weak_targets().begin(), finished.weak_targets().end());
+      change.report_json = finished.report_json();
+      Add(index, std::move(change));
+      return;
+    }
+    case v1::HeldJob::kFailed: {
+      if (!is_leased) return;
+      const v1::HeldJob::Failed& failed = held.failed();
+      const bool is_damage = ValidateDigest(failed.damaged_blob()).ok();
+      if (is_damage) damaged_blobs_.emplace_back(job.reconstruction_id, failed.damaged_blob());
+      Add(index, failed.infrastructure() || is_damage ? LossOf(job, failed.reason(), false)
+                                                      : FailureOf(job, failed.reason(), failed.out_of_memory()));
+      return;
+    }
+    case v1::HeldJob::kReleased: {
+      if (is_leased) Add(index, ChangeOf(JobChange::Kind::kRelease, job));
+      return;
+    }
+    case v1::HeldJob::kRunning:
+    case v1::HeldJob::OUTCOME_NOT_SET: {
+      if (!is_leased || job.lease_expires_at - now_ > kRenewBelow * lease_.lease) return;
+      if (now_ - job.leased_at > lease_.job_time_limit) return;  // Expire() sees to it
+      JobChange change = ChangeOf(JobChange::Kind::kRenew, job);
+      change.expires_at = now_ + lease_.lease;
+      Add(index, std::move(change));
+      return;
+    }
+  }
+}
+
+void SchedulingPass::Expire(bool silence_counts) {
+  for (size_t i = 0; i < jobs_.size(); ++i) {
+    const OpenJob& job = jobs_[i];
+    if (job.lease_worker.empty() || changed_[i]) continue;
+    if (now_ - job.leased_at > lease_.job_time_limit) {
+      Add(i, FailureOf(job, absl::StrCat("took longer than ", absl::FormatDuration(lease_.job_time_limit)), false));
+    } else if (silence_counts && job.lease_expires_at <= now_) {
+      JobChange change = LossOf(job, absl::StrCat("worker ", job.lease_worker, " is silent"), false);
+      change.only_if_expired_at = now_;
+      Add(i, std::move(change));
+    }
+  }
+}
+
+bool SchedulingPass::Fits(const OpenJob& job, int64_t free_bytes) const {
+  return job.not_before <= now_ && job.memory_bytes <= free_bytes;
+}
+
+void SchedulingPass::Grant(const v1::SynchronizeRequest& request) {
+  if (request.draining()) return;
+  std::set<size_t>& leases = by_worker_[request.worker_id()];
+  int64_t free_bytes = request.memory_bytes();
+  for (const size_t job : leases) free_bytes -= jobs_[job].memory_bytes;
+  while (static_cast<int>(leases.size()) < request.cores()) {
+    Share* best = nullptr;
+    size_t best_job = 0;
+    for (auto& [id, share] : shares_) {
+      if (best != nullptr && share.leases / share.weight >= best->leases / best->weight) continue;
+      const auto fitting = std::find_if(share.waiting.begin(), share.waiting.end(),
+                                        [&](size_t job) { return !changed_[job] && Fits(jobs_[job], free_bytes); });
+      if (fitting == share.waiting.end()) continue;
+      best = &share;
+      best_job = *fitting;
+    }
+    if (best == nullptr) return;
+    JobChange change = ChangeOf(JobChange::Kind::kClaim, jobs_[best_job]);
+    change.worker = request.worker_id();
+    change.instance = request.instance();
+    change.expires_at = now_ + lease_.lease;
+    free_bytes -= jobs_[best_job].memory_bytes;
+    Add(best_job, std::move(change));
+    ++best->leases;
+    leases.insert(best_job);
+  }
+}
+
+void SchedulingPass::ApplyOutcome(const Change& decided, const JobChangeResult& result) {
+  OpenJob& job = jobs_[decided.job];
+  if (decided.change.kind != JobChange::Kind::kClaim) {
+    if (result.status.ok() && decided.change.kind != JobChange::Kind::kRenew) job.lease_worker.clear();
+    return;
+  }
+  if (result.status.ok()) {
+    job.epoch = result.job->epoch;
+    job.lease_worker = decided.change.worker;
+    job.lease_instance = decided.change.instance;
+    job.leased_at = now_;
+    job.lease_expires_at = decided.change.expires_at;
+  } else {
+    by_worker_[decided.change.worker].erase(decided.job);
+    --shares_[job.reconstruction_id].leases;
+  }
+}
+
+std::vector<const OpenJob*> SchedulingPass::HeldBy(const std::string& worker, const std::string& instance) const {
+  std::vector<const OpenJob*> held;
+  const auto found = by_worker_.find(worker);
+  if (found == by_worker_.end()) return held;
+  for (const size_t job : found->second) {
+    if (jobs_[job].lease_instance == instance) held.push_back(&jobs_[job]);
+  }
+  return held;
+}
+
+int SchedulingPass::LeasesIn(const std::string& reconstruction) const {
+  const auto found = shares_.find(reconstruction);
+  return found == shares_.end() ? 0 : found->second.leases;
+}
+
+}  // namespace meshwright

@@ -1,0 +1,282 @@
+#include "coordinator/dispatch/scheduling_pass.h"
+
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace meshwright {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Kind = JobChange::Kind;
+
+const absl::Time kNow = absl::FromUnixSeconds(1'000'000);
+const LeaseOptions kLease = {.lease = absl::Seconds(30), .job_time_limit = absl::Seconds(100)};
+const RetryOptions kRetry = {.max_failures = 3, .max_losses = 5, .backoff = absl::Seconds(1)};
+
+OpenJob Waiting(const std::string& id, SequenceNumber sequence, int64_t memory_bytes = 10, double weight = 1) {
+  return {.reconstruction_id = id,
+          .weight = weight,
+          .sequence = sequence,
+          .epoch = 1,
+          .memory_bytes = memory_bytes,
+          .not_before = kNow};
+}
+
+OpenJob Leased(const std::string& id, SequenceNumber sequence, const std::string& worker,
+               absl::Duration age = absl::ZeroDuration()) {
+  OpenJob job = Waiting(id, sequence);
+  job.epoch = 2;
+  job.lease_worker = worker;
+  job.lease_instance = "1";
+  job.leased_at = kNow - age;
+  job.lease_expires_at = kNow - age + kLease.lease;
+  return job;
+}
+
+v1::SynchronizeRequest Worker(const std::string& id, int cores = 1, int64_t memory_bytes = 1000) {
+  v1::SynchronizeRequest request;
+  request.set_worker_id(id);
+  request.set_instance("1");
+  request.set_cores(cores);
+  request.set_memory_bytes(memory_bytes);
+  return request;
+}
+
+v1::HeldJob& Hold(v1::SynchronizeRequest& request, const OpenJob& job) {
+  v1::HeldJob& held = *request.add_held();
+  held.mutable_key()->set_reconstruction_id(job.reconstruction_id);
+  held.mutable_key()->set_sequence(job.sequence);
+  held.mutable_key()->set_epoch(job.epoch);
+  held.mutable_running();
+  return held;
+}
+
+SchedulingPass Plan(std::vector<OpenJob> jobs, absl::Time now = kNow) {
+  return SchedulingPass(kLease, kRetry, std::move(jobs), now, [](const OpenJob&) {
+    return std::vector<int64_t>{10, 5, 2};
+  });
+}
+
+// "kind reconstruction sequence" of each change.
+std::vector<std::string> Changes(const SchedulingPass& plan) {
+  std::vector<std::string> texts;
+  for (const SchedulingPass::Change& one : plan.changes()) {
+    const char* const names[] = {"claim", "renew", "complete", "skip", "release", "fail", "lose"};
+    texts.push_back(absl::StrCat(names[static_cast<size_t>(one.change.kind)], " ", one.change.id, one.change.sequence));
+  }
+  return texts;
+}
+
+TEST(SchedulingPassTest, AWorkerGetsWhatFitsItsCoresAndMemory) {
+  SchedulingPass plan = Plan({Waiting("a", 1, 600), Waiting("a", 2, 600), Waiting("a", 3, 300), Waiting("a", 4, 50)});
+  plan.Grant(Worker("w", 3));
+  EXPECT_THAT(Changes(plan), ElementsAre("claim a1", "claim a3", "claim a4"));
+  plan.Grant(Worker("v", 3));
+  EXPECT_THAT(Changes(plan), ElementsAre("claim a1", "claim a3", "claim a4", "claim a2"));
+}
+
+TEST(SchedulingPassTest, WhatItHoldsAlreadyCounts) {
+  SchedulingPass plan = Plan({Leased("a", 1, "w"), Waiting("a", 2), Waiting("a", 3)});
+  plan.Grant(Worker("w", 2));
+  EXPECT_THAT(Changes(plan), ElementsAre("claim a2"));
+  SchedulingPass full = Plan({Leased("a", 1, "w"), Waiting("a", 2, 995)});
+  full.Grant(Worker("w", 2));
+  EXPECT_THAT(Changes(full), IsEmpty());
+}
+
+TEST(SchedulingPassTest, ADrainingWorkerGetsNothing) {
+  SchedulingPass plan = Plan({Waiting("a", 1)});
+  v1::SynchronizeRequest request = Worker("w");
+  request.set_draining(true);
+  plan.Grant(request);
+  EXPECT_THAT(Changes(plan), IsEmpty());
+}
+
+TEST(SchedulingPassTest, ReconstructionsShareByWeightWhateverTheirSize) {
+  std::vector<OpenJob> jobs;
+  for (SequenceNumber sequence = 1; sequence <= 100; ++sequence) {
+    jobs.push_back(Waiting("a", sequence));
+    jobs.push_back(Waiting("c", sequence, 10, 2));
+    if (sequence <= 15) jobs.push_back(Waiting("b", sequence));
+  }
+  SchedulingPass plan = Plan(jobs);
+  for (int worker = 0; worker < 40; ++worker) plan.Grant(Worker(absl::StrCat("w", worker)));
+  EXPECT_EQ(plan.LeasesIn("a"), 10);
+  EXPECT_EQ(plan.LeasesIn("b"), 10);
+  EXPECT_EQ(plan.LeasesIn("c"), 20);
+}
+
+TEST(SchedulingPassTest, LeasesThatOtherCoordinatorsGaveCountToo) {
+  SchedulingPass plan =
+      Plan({Leased("a", 1, "x"), Leased("a", 2, "y"), Waiting("a", 3), Waiting("b", 1), Waiting("b", 2)});
+  plan.Grant(Worker("w", 2));
+  EXPECT_THAT(Changes(plan), ElementsAre("claim b1", "claim b2"));
+}
+
+TEST(SchedulingPassTest, BackoffIsWaitedFor) {
+  OpenJob job = Waiting("a", 1);
+  job.not_before = kNow + absl::Seconds(5);
+  SchedulingPass early = Plan({job}, kNow + absl::Seconds(4));
+  early.Grant(Worker("w"));
+  EXPECT_THAT(Changes(early), IsEmpty());
+  SchedulingPass plan = Plan({job}, kNow + absl::Seconds(5));
+  plan.Grant(Worker("w"));
+  EXPECT_THAT(Changes(plan), ElementsAre("claim a1"));
+}
+
+TEST(SchedulingPassTest, ASilentWorkerLosesItsLeasesAndAHeardOneKeepsThem) {
+  const OpenJob silent = Leased("a", 1, "s", absl::Seconds(31));
+  const OpenJob heard = Leased("a", 2, "h", absl::Seconds(31));
+  v1::SynchronizeRequest request = Worker("h");
+  Hold(request, heard);
+  SchedulingPass plan = Plan({silent, heard});
+  EXPECT_FALSE(plan.ApplyReport(request));
+  plan.Expire(true);
+  EXPECT_THAT(Changes(plan), ElementsAre("renew a2", "lose a1"));
+  EXPECT_EQ(plan.changes()[1].change.only_if_expired_at, kNow);
+  // After a pause of the coordinator, silence says nothing.
+  SchedulingPass paused = Plan({silent});
+  paused.Expire(false);
+  EXPECT_THAT(Changes(paused), IsEmpty());
+}
+
+TEST(SchedulingPassTest, AWorkerThatHangsAndIsAliveLosesTheJobToo) {
+  OpenJob job = Leased("a", 1, "w", absl::Seconds(101));
+  job.lease_expires_at = kNow + absl::Seconds(5);
+  v1::SynchronizeRequest request = Worker("w");
+  Hold(request, job);
+  SchedulingPass plan = Plan({job});
+  plan.ApplyReport(request);
+  plan.Expire(true);
+  ASSERT_THAT(Changes(plan), ElementsAre("fail a1"));
+  EXPECT_THAT(plan.changes()[0].change.reason, HasSubstr("took longer"));
+}
+
+TEST(SchedulingPassTest, ANewProcessOfAWorkerHasLostWhatTheOldOneHeld) {
+  v1::SynchronizeRequest request = Worker("w");
+  request.set_instance("2");
+  SchedulingPass plan = Plan({Leased("a", 1, "w")});
+  plan.ApplyReport(request);
+  plan.Grant(request);
+  EXPECT_THAT(Changes(plan), ElementsAre("lose a1"));
+  EXPECT_THAT(plan.HeldBy("w", "2"), IsEmpty());
+}
+
+TEST(SchedulingPassTest, WhatRanOutOfMemoryIsMadeSmallerAndThenSkipped) {
+  v1::SynchronizeRequest request = Worker("w");
+  request.set_instance("2");
+  request.set_ran_out_of_memory(true);
+  OpenJob job = Leased("a", 1, "w");
+  for (int64_t attempt = 0; attempt < 2; ++attempt) {
+    job.failed_attempts = attempt;
+    job.reduction = attempt;
+    SchedulingPass plan = Plan({job});
+    plan.ApplyReport(request);
+    ASSERT_THAT(Changes(plan), ElementsAre("fail a1"));
+    EXPECT_TRUE(plan.changes()[0].change.out_of_memory);
+    EXPECT_TRUE(plan.changes()[0].change.reduce);
+    EXPECT_EQ(plan.changes()[0].change.memory_bytes, attempt == 0 ? 5 : 2);
+  }
+  job.failed_attempts = 2;
+  job.reduction = 2;
+  SchedulingPass plan = Plan({job});
+  plan.ApplyReport(request);
+  EXPECT_THAT(Changes(plan), ElementsAre("skip a1"));
+}
+
+TEST(SchedulingPassTest, FailuresBackOffAndEnd) {
+  v1::SynchronizeRequest request = Worker("w");
+  OpenJob job = Leased("a", 1, "w");
+  Hold(request, job).mutable_failed()->set_reason("broken");
+  for (int64_t before = 0; before < 2; ++before) {
+    job.failed_attempts = before;
+    SchedulingPass plan = Plan({job});
+    EXPECT_TRUE(plan.ApplyReport(request));
+    ASSERT_THAT(Changes(plan), ElementsAre("fail a1"));
+    EXPECT_EQ(plan.changes()[0].change.retry_at, kNow + absl::Seconds(1 << before));
+    EXPECT_FALSE(plan.changes()[0].change.reduce);
+  }
+  job.failed_attempts = 2;
+  SchedulingPass plan = Plan({job});
+  plan.ApplyReport(request);
+  ASSERT_THAT(Changes(plan), ElementsAre("skip a1"));
+  EXPECT_EQ(plan.changes()[0].change.reason, "broken");
+  // A camera that is committed already cannot be skipped.
+  job.is_repair = true;
+  SchedulingPass repair = Plan({job});
+  repair.ApplyReport(request);
+  EXPECT_THAT(Changes(repair), ElementsAre("fail a1"));
+}
+
+TEST(SchedulingPassTest, LosingWorkersCountsApartAndEndsToo) {
+  v1::SynchronizeRequest request = Worker("w");
+  OpenJob job = Leased("a", 1, "w");
+  Hold(request, job).mutable_failed()->set_infrastructure(true);
+  job.losses = 3;
+  SchedulingPass plan = Plan({job});
+  plan.ApplyReport(request);
+  ASSERT_THAT(Changes(plan), ElementsAre("lose a1"));
+  EXPECT_EQ(plan.changes()[0].change.retry_at, kNow + absl::Seconds(4));
+  job.losses = 4;
+  SchedulingPass last = Plan({job});
+  last.ApplyReport(request);
+  EXPECT_THAT(Changes(last), ElementsAre("skip a1"));
+}
+
+TEST(SchedulingPassTest, ResultsAreTakenFromTheHolderOrFromWhoWasLateAndIsTheOnlyOne) {
+  const auto changes_of = [](const OpenJob& job, int64_t epoch, const std::string& worker) {
+    v1::SynchronizeRequest request = Worker(worker);
+    v1::HeldJob& held = Hold(request, job);
+    held.mutable_key()->set_epoch(epoch);
+    held.mutable_finished()->set_filtered_digest(std::string(64, 'a'));
+    held.mutable_finished()->set_report_json("{}");
+    SchedulingPass plan = Plan({job});
+    EXPECT_TRUE(plan.ApplyReport(request));
+    return Changes(plan);
+  };
+  OpenJob job = Leased("a", 1, "w");
+  EXPECT_THAT(changes_of(job, 2, "w"), ElementsAre("complete a1"));
+  EXPECT_THAT(changes_of(job, 2, "other"), IsEmpty());
+  EXPECT_THAT(changes_of(job, 1, "w"), IsEmpty());
+  job.lease_worker.clear();
+  EXPECT_THAT(changes_of(job, 2, "w"), ElementsAre("complete a1"));
+  EXPECT_THAT(changes_of(job, 1, "w"), IsEmpty());
+}
+
+TEST(SchedulingPassTest, AResultThatIsNoneIsAFailure) {
+  const OpenJob job = Leased("a", 1, "w");
+  for (const bool bad_digest : {true, false}) {
+    v1::SynchronizeRequest request = Worker("w");
+    v1::HeldJob& held = Hold(request, job);
+    held.mutable_finished()->set_filtered_digest(bad_digest ? "../x" : std::string(64, 'a'));
+    held.mutable_finished()->set_report_json(bad_digest ? "{}" : "{");
+    SchedulingPass plan = Plan({job});
+    plan.ApplyReport(request);
+    EXPECT_THAT(Changes(plan), ElementsAre("fail a1"));
+  }
+}
+
+TEST(SchedulingPassTest, ABlobThatCannotBeReadIsReportedAndNotTheJobsFault) {
+  const OpenJob job = Leased("a", 1, "w");
+  v1::SynchronizeRequest request = Worker("w");
+  Hold(request, job).mutable_failed()->set_damaged_blob(std::string(64, 'b'));
+  SchedulingPass plan = Plan({job});
+  plan.ApplyReport(request);
+  EXPECT_THAT(Changes(plan), ElementsAre("lose a1"));
+  EXPECT_THAT(plan.damaged_blobs(), ElementsAre(testing::Pair("a", std::string(64, 'b'))));
+}
+
+TEST(SchedulingPassTest, WhatIsGivenBackCountsForNothing) {
+  const OpenJob job = Leased("a", 1, "w");
+  v1::SynchronizeRequest request = Worker("w");
+  Hold(request, job).mutable_released();
+  SchedulingPass plan = Plan({job});
+  EXPECT_TRUE(plan.ApplyReport(request));
+  EXPECT_THAT(Changes(plan), ElementsAre("release a1"));
+}
+
+}  // namespace
+}  // namespace meshwright

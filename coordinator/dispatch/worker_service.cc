@@ -1,0 +1,486 @@
+#include "coordinator/dispatch/worker_service.h"
+
+#include <algorithm>
+#include <future>
+#include <set>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include "common/base/status_macros.h"
+#include "common/job/job_spec_codec.h"
+#include "coordinator/dispatch/proto_times.h"
+
+namespace meshwright {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr size_t kMaxIdLength = 128;
+constexpr int kMaxCores = 4096;
+constexpr double kMaxWaitTimeoutSeconds = 60;
+// Other coordinators, and backoffs that end, are noticed by looking again: often while a worker waits.
+constexpr std::chrono::milliseconds kPoll(100);
+constexpr std::chrono::milliseconds kPollIdle(1000);
+constexpr std::chrono::milliseconds kAfterFailure(200);
+// Workers are shown for a while after they were heard of last.
+constexpr int kLeasesUntilForgotten = 10;
+constexpr absl::Duration kLookAtWorkers = absl::Seconds(1);
+constexpr size_t kMaxBackgrounds = 1000;
+
+JobKey FromProto(const v1::JobKey& key) { return {key.reconstruction_id(), key.sequence(), key.epoch()}; }
+JobKey KeyOf(const OpenJob& job) { return {job.reconstruction_id, job.sequence, job.epoch}; }
+
+void FillKey(const OpenJob& job, v1::JobKey& key) {
+  key.set_reconstruction_id(job.reconstruction_id);
+  key.set_sequence(job.sequence);
+  key.set_epoch(job.epoch);
+}
+
+std::set<JobKey> RunningAt(const v1::SynchronizeRequest& request) {
+  std::set<JobKey> running;
+  for (const v1::HeldJob& held : request.held()) {
+    if (held.outcome_case() == v1::HeldJob::kRunning) running.insert(FromProto(held.key()));
+  }
+  return running;
+}
+
+absl::Status Validate(const v1::SynchronizeRequest& request) {
+  if (request.worker_id().empty() || request.worker_id().size() > kMaxIdLength) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("worker_id has ", request.worker_id().size(), " characters, expected 1..", kMaxIdLength));
+  }
+  if (request.instance().empty() || request.instance().size() > kMaxIdLength) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("instance has ", request.instance().size(), " characters, expected 1..", kMaxIdLength));
+  }
+  if (request.cores() < 1 || request.cores() > kMaxCores) {
+    return absl::InvalidArgumentError(absl::StrCat("cores is ", request.cores(), ", expected 1..", kMaxCores));
+  }
+  if (request.memory_bytes() < 1) {
+    return absl::InvalidArgumentError(absl::StrCat("memory_bytes is ", request.memory_bytes(), ", expected >= 1"));
+  }
+  if (!(request.wait_timeout_seconds() >= 0 && request.wait_timeout_seconds() <= kMaxWaitTimeoutSeconds)) {
+    return absl::InvalidArgumentError(absl::StrCat("wait_timeout_seconds is ", request.wait_timeout_seconds(),
+                                                   ", expected 0..", kMaxWaitTimeoutSeconds));
+  }
+  return absl::OkStatus();
+}
+
+double Gibibytes(int64_t bytes) { return static_cast<double>(bytes) / static_cast<double>(int64_t{1} << 30); }
+
+v1::Attempt RunningAttempt(const OpenJob& job) {
+  v1::Attempt attempt;
+  attempt.set_reconstruction_id(job.reconstruction_id);
+  attempt.set_sequence(job.sequence);
+  attempt.set_camera(job.camera);
+  attempt.set_epoch(job.epoch);
+  attempt.set_worker(job.lease_worker);
+  FillTime(job.leased_at, *attempt.mutable_begin_time());
+  return attempt;
+}
+
+}  // namespace
+
+WorkerService::WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store)
+    : lease_(lease), retry_(retry), store_(store) {
+  thread_ = std::thread([this] { Run(); });
+}
+
+WorkerService::~WorkerService() {
+  Shutdown();
+  thread_.join();
+}
+
+void WorkerService::Shutdown() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_all();
+}
+
+absl::Status WorkerService::Drain(const std::string& worker) {
+  const absl::Status drained = store_.SetWorkerDrained(worker, true);
+  if (absl::IsNotFound(drained)) {
+    return absl::NotFoundError(absl::StrCat("there is no worker \"", worker.substr(0, kMaxIdLength), "\""));
+  }
+  MW_RETURN_IF_ERROR(drained);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    workers_changed_ = true;
+    awake_ = true;
+  }
+  wake_.notify_all();
+  return absl::OkStatus();
+}
+
+void WorkerService::Wake() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    awake_ = true;
+  }
+  wake_.notify_all();
+}
+
+void WorkerService::SetListener(std::function<void(const std::string&)> listener) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  listener_ = std::move(listener);
+}
+
+int64_t WorkerService::Synchronize(const v1::SynchronizeRequest& request, Answer answer) {
+  absl::Status status = Validate(request);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (stopping_ && status.ok()) status = absl::UnavailableError("the coordinator is going down");
+    if (status.ok()) {
+      const double wait = std::min(request.wait_timeout_seconds(), absl::ToDoubleSeconds(lease_.lease / 3));
+      const auto deadline =
+          SteadyClock::now() + std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(wait));
+      calls_.push_back({.number = next_call_++, .request = request, .answer = std::move(answer), .deadline = deadline});
+      awake_ = true;
+      wake_.notify_all();
+      return calls_.back().number;
+    }
+  }
+  answer(status);
+  return 0;
+}
+
+void WorkerService::Abandon(int64_t call) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    abandoned_.push_back(call);
+    awake_ = true;
+  }
+  wake_.notify_all();
+}
+
+absl::StatusOr<v1::SynchronizeResponse> WorkerService::Synchronize(const v1::SynchronizeRequest& request,
+                                                                   const std::function<bool()>& cancelled) {
+  const auto promise = std::make_shared<std::promise<absl::StatusOr<v1::SynchronizeResponse>>>();
+  std::future<absl::StatusOr<v1::SynchronizeResponse>> answer = promise->get_future();
+  const int64_t call = Synchronize(request, [promise](absl::StatusOr<v1::SynchronizeResponse> response) {
+    promise->set_value(std::move(response));
+  });
+  while (answer.wait_for(kPoll) != std::future_status::ready) {
+    if (cancelled()) Abandon(call);
+  }
+  return answer.get();
+}
+
+void WorkerService::Run() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (true) {
+    const auto look_again =
+        calls_.empty() ? std::min(kPollIdle, std::chrono::milliseconds(absl::ToInt64Milliseconds(lease_.lease / 5)))
+                       : kPoll;
+    auto until = SteadyClock::now() + look_again;
+    for (const Call& call : calls_) until = std::min(until, call.deadline);
+    wake_.wait_until(lock, until, [&] { return awake_ || stopping_; });
+    awake_ = false;
+    const bool last = stopping_;
+    lock.unlock();
+    Turn();
+    lock.lock();
+    if (last && calls_.empty()) return;
+  }
+}
+
+void WorkerService::Turn() {
+  std::list<Call> calls;
+  std::vector<int64_t> abandoned;
+  bool stopping = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    calls.swap(calls_);
+    abandoned.swap(abandoned_);
+    stopping = stopping_;
+  }
+  std::map<std::string, int64_t> newest;
+  for (const Call& call : calls) newest[call.request.worker_id()] = call.number;
+  for (auto call = calls.begin(); call != calls.end();) {
+    absl::Status end;
+    if (std::find(abandoned.begin(), abandoned.end(), call->number) != abandoned.end()) {
+      end = absl::CancelledError("the worker does not wait any more");
+    } else if (newest[call->request.worker_id()] != call->number) {
+      end = absl::AbortedError(absl::StrCat("worker ", call->request.worker_id(), " has called again"));
+    }
+    if (end.ok()) {
+      if (stopping) call->deadline = SteadyClock::now();
+      ++call;
+    } else {
+      call->answer(end);
+      call = calls.erase(call);
+    }
+  }
+  const absl::Status status = TakeTurn(calls);
+  if (!status.ok()) {
+    for (auto call = calls.begin(); call != calls.end();) {
+      if (call->is_heard && call->deadline > SteadyClock::now()) {
+        ++call;
+        continue;
+      }
+      call->answer(status);
+      call = calls.erase(call);
+    }
+    if (!stopping) std::this_thread::sleep_for(kAfterFailure);
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  calls_.splice(calls_.begin(), calls);
+}
+
+absl::Status WorkerService::TakeTurn(std::list<Call>& calls) {
+  MW_ASSIGN_OR_RETURN(const absl::Time now, store_.Now());
+  MW_ASSIGN_OR_RETURN(std::vector<OpenJob> open, store_.ListOpenJobs());
+  MW_RETURN_IF_ERROR(LookAtWorkers(now));
+  // Who could not be heard was not silent: after a pause of this coordinator (or its store) workers get some time.
+  if (now - last_turn_ > lease_.lease / 2) silence_counts_from_ = now + lease_.lease / 2;
+  last_turn_ = now;
+
+  SchedulingPass plan(lease_, retry_, std::move(open), now, [this](const OpenJob& job) -> std::vector<int64_t> {
+    const absl::StatusOr<CameraJob> stored = store_.GetCameraJob(job.reconstruction_id, job.sequence);
+    if (!stored.ok()) return {};
+    const absl::StatusOr<StoredJobSpec> spec = DecodeJobSpec(stored->spec);
+    return spec.ok() ? spec->memory_bytes : std::vector<int64_t>();
+  });
+  for (Call& call : calls) {
+    if (!call.is_heard) call.is_settled = plan.ApplyReport(call.request);
+  }
+  plan.Expire(now >= silence_counts_from_);
+  for (const Call& call : calls) {
+    const auto worker = written_workers_.find(call.request.worker_id());
+    if (worker == written_workers_.end() || !worker->second.drained) plan.Grant(call.request);
+  }
+  MW_RETURN_IF_ERROR(Apply(plan, Heartbeats(calls, now), now));
+  Publish(plan, now);
+
+  for (auto call = calls.begin(); call != calls.end();) {
+    call->is_heard = true;
+    const std::vector<const OpenJob*> held = plan.HeldBy(call->request.worker_id(), call->request.instance());
+    std::set<JobKey> wanted;
+    for (const OpenJob* const job : held) wanted.insert(KeyOf(*job));
+    if (!call->is_settled && wanted == RunningAt(call->request) && call->deadline > SteadyClock::now()) {
+      ++call;
+      continue;
+    }
+    call->answer(AnswerTo(*call, held));
+    call = calls.erase(call);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status WorkerService::Apply(SchedulingPass& plan, const std::vector<WorkerRecord>& heartbeats, absl::Time now) {
+  const std::vector<SchedulingPass::Change> decided = plan.changes();
+  std::vector<JobChange> changes;
+  changes.reserve(decided.size());
+  for (const SchedulingPass::Change& one : decided) changes.push_back(one.change);
+  MW_ASSIGN_OR_RETURN(std::vector<JobChangeResult> results, store_.ApplyChanges(changes, heartbeats, now));
+  for (const WorkerRecord& worker : heartbeats) written_workers_[worker.id] = worker;
+
+  std::set<std::string> news;
+  std::vector<JobChange> refused;
+  for (size_t i = 0; i < decided.size(); ++i) {
+    const JobChange& change = decided[i].change;
+    const OpenJob job = plan.jobs()[decided[i].job];
+    plan.ApplyOutcome(decided[i], results[i]);
+    if (results[i].status.ok() && change.kind == JobChange::Kind::kClaim) {
+      claimed_[{change.id, change.sequence}] = *std::move(results[i].job);
+    }
+    const bool is_result = change.kind == JobChange::Kind::kComplete || change.kind == JobChange::Kind::kSkipped;
+    if (is_result && results[i].status.ok()) news.insert(change.id);
+    // A result that the store does not take is a failure of the job; or nobody's any more, which the fence tells.
+    if (change.kind == JobChange::Kind::kComplete && !results[i].status.ok() && !job.lease_worker.empty()) {
+      refused.push_back(plan.FailureOf(
+          job, job.is_repair ? "made again, the result is another one" : std::string(results[i].status.message()),
+          false));
+    }
+  }
+  if (!refused.empty()) {
+    MW_RETURN_IF_ERROR(store_.ApplyChanges(refused, {}, now).status());
+    for (const JobChange& change : refused) news.insert(change.id);
+  }
+  for (const auto& [reconstruction, digest] : plan.damaged_blobs()) {
+    MW_RETURN_IF_ERROR(store_.ReportDamagedBlob(reconstruction, digest));
+    news.insert(reconstruction);
+  }
+  std::function<void(const std::string&)> listener;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    listener = listener_;
+  }
+  if (listener) {
+    for (const std::string& reconstruction : news) listener(reconstruction);
+  }
+  return absl::OkStatus();
+}
+
+std::vector<WorkerRecord> WorkerService::Heartbeats(const std::list<Call>& calls, absl::Time now) {
+  std::vector<WorkerRecord> heartbeats;
+  for (const Call& call : calls) {
+    const v1::SynchronizeRequest& request = call.request;
+    const WorkerRecord& before = written_workers_[request.worker_id()];
+    const WorkerRecord heard = {.id = request.worker_id(),
+                                .cores = request.cores(),
+                                .memory_bytes = request.memory_bytes(),
+                                .last_heartbeat = now,
+                                .drained = before.drained && before.instance == request.instance(),
+                                .instance = request.instance(),
+                                .version = request.version(),
+                                .draining = request.draining()};
+    const bool is_same = before.cores == heard.cores && before.memory_bytes == heard.memory_bytes &&
+                         before.instance == heard.instance && before.version == heard.version &&
+                         before.draining == heard.draining;
+    if (!is_same || now - before.last_heartbeat > lease_.lease / 4) heartbeats.push_back(heard);
+  }
+  return heartbeats;
+}
+
+absl::Status WorkerService::LookAtWorkers(absl::Time now) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const bool is_due = now - last_look_at_workers_ >= std::min(lease_.lease / 4, kLookAtWorkers);
+    if (!is_due && !workers_changed_) return absl::OkStatus();
+    workers_changed_ = false;
+  }
+  MW_RETURN_IF_ERROR(store_.RemoveSilentWorkers(now - kLeasesUntilForgotten * lease_.lease));
+  MW_ASSIGN_OR_RETURN(const std::vector<WorkerRecord> workers, store_.ListWorkers());
+  last_look_at_workers_ = now;
+  written_workers_.clear();
+  for (const WorkerRecord& worker : workers) written_workers_[worker.id] = worker;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<WorkerService::Background> WorkerService::BackgroundOf(const std::string& reconstruction) {
+  const auto found = backgrounds_.find(reconstruction);
+  if (found != backgrounds_.end()) return found->second;
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, store_.GetReconstruction(reconstruction));
+  if (backgrounds_.size() >= kMaxBackgrounds) backgrounds_.clear();
+  return backgrounds_[reconstruction] = {.options_json = stored.options_json, .scene_blob = stored.scene_blob};
+}
+
+absl::StatusOr<v1::CameraJob> WorkerService::FullJob(const OpenJob& job) {
+  CameraJob& stored = claimed_[{job.reconstruction_id, job.sequence}];
+  if (stored.spec.empty() || stored.epoch != job.epoch) {
+    // Claimed by another coordinator, or by this one before it was started anew.
+    MW_ASSIGN_OR_RETURN(stored, store_.GetCameraJob(job.reconstruction_id, job.sequence));
+  }
+  MW_ASSIGN_OR_RETURN(const StoredJobSpec spec, DecodeJobSpec(stored.spec));
+  MW_ASSIGN_OR_RETURN(const Background background, BackgroundOf(job.reconstruction_id));
+  v1::CameraJob full;
+  FillKey(job, *full.mutable_key());
+  full.set_camera(stored.camera);
+  full.set_snapshot(stored.snapshot);
+  full.mutable_neighbours()->Add(stored.neighbours.begin(), stored.neighbours.end());
+  full.mutable_targets()->Add(spec.targets.begin(), spec.targets.end());
+  for (const AcceptedSurface& accepted : spec.accepted) {
+    v1::AcceptedSurface& surface = *full.add_accepted();
+    surface.set_sequence(accepted.sequence);
+    surface.set_camera(accepted.camera);
+    surface.set_digest(accepted.digest);
+    surface.set_patches(accepted.patches);
+  }
+  full.set_options_json(background.options_json);
+  full.set_scene_digest(background.scene_blob);
+  full.set_memory_bytes(job.memory_bytes);
+  full.set_reduction(static_cast<int32_t>(job.reduction));
+  return full;
+}
+
+absl::StatusOr<v1::SynchronizeResponse> WorkerService::AnswerTo(const Call& call,
+                                                                const std::vector<const OpenJob*>& held) {
+  const std::set<JobKey> known = RunningAt(call.request);
+  v1::SynchronizeResponse response;
+  for (const OpenJob* const job : held) {
+    if (known.count(KeyOf(*job)) > 0) {
+      FillKey(*job, *response.add_jobs()->mutable_key());
+    } else {
+      MW_ASSIGN_OR_RETURN(*response.add_jobs(), FullJob(*job));
+    }
+  }
+  response.set_lease_seconds(absl::ToDoubleSeconds(lease_.lease));
+  response.set_next_sync_seconds(absl::ToDoubleSeconds(lease_.lease / 3));
+  return response;
+}
+
+void WorkerService::Publish(const SchedulingPass& plan, absl::Time now) {
+  std::set<std::pair<std::string, SequenceNumber>> leased;
+  for (const OpenJob& job : plan.jobs()) {
+    if (!job.lease_worker.empty()) leased.insert({job.reconstruction_id, job.sequence});
+  }
+  for (auto it = claimed_.begin(); it != claimed_.end();) {
+    it = leased.count(it->first) > 0 ? std::next(it) : claimed_.erase(it);
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  seen_ = plan.jobs();
+  workers_ = written_workers_;
+  seen_at_ = now;
+}
+
+int WorkerService::LeasesIn(const std::string& reconstruction) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return static_cast<int>(std::count_if(seen_.begin(), seen_.end(), [&](const OpenJob& job) {
+    return job.reconstruction_id == reconstruction && !job.lease_worker.empty();
+  }));
+}
+
+std::vector<std::string> WorkerService::WarningsFor(const std::string& reconstruction) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  int64_t largest_worker = 0;
+  for (const auto& [id, worker] : workers_) {
+    const bool is_alive = seen_at_ - worker.last_heartbeat <= lease_.lease && !worker.draining && !worker.drained;
+    if (is_alive) largest_worker = std::max(largest_worker, worker.memory_bytes);
+  }
+  std::vector<std::string> warnings;
+  bool waits = false;
+  for (const OpenJob& job : seen_) {
+    if (job.reconstruction_id != reconstruction || !job.lease_worker.empty()) continue;
+    waits = true;
+    if (largest_worker == 0 || job.memory_bytes <= largest_worker) continue;
+    warnings.push_back(
+        absl::StrFormat("camera %d needs %.1f GiB of memory, the largest worker has %.1f GiB: start a worker with more",
+                        job.camera, Gibibytes(job.memory_bytes), Gibibytes(largest_worker)));
+  }
+  if (waits && largest_worker == 0) warnings.emplace_back("cameras wait, and no worker is connected");
+  return warnings;
+}
+
+std::vector<v1::Attempt> WorkerService::RunningIn(const std::string& reconstruction) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<v1::Attempt> attempts;
+  for (const OpenJob& job : seen_) {
+    if (job.lease_worker.empty() || (!reconstruction.empty() && job.reconstruction_id != reconstruction)) continue;
+    attempts.push_back(RunningAttempt(job));
+  }
+  return attempts;
+}
+
+v1::ListWorkersResponse WorkerService::ListWorkers() const {
+  std::map<std::string, WorkerRecord> workers;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    workers = workers_;
+  }
+  v1::ListWorkersResponse response;
+  std::map<std::string, v1::Worker*> by_id;
+  for (const auto& [id, record] : workers) {
+    v1::Worker& worker = *response.add_workers();
+    worker.set_id(record.id);
+    worker.set_cores(static_cast<int32_t>(record.cores));
+    worker.set_memory_bytes(record.memory_bytes);
+    worker.set_draining(record.draining || record.drained);
+    worker.set_version(record.version);
+    FillTime(record.last_heartbeat, *worker.mutable_last_seen());
+    by_id[record.id] = &worker;
+  }
+  for (v1::Attempt& attempt : RunningIn("")) {
+    const auto worker = by_id.find(attempt.worker());
+    if (worker == by_id.end()) continue;
+    worker->second->set_jobs(worker->second->jobs() + 1);
+    *worker->second->add_running() = std::move(attempt);
+  }
+  return response;
+}
+
+}  // namespace meshwright

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "meshwright/v1/reconstruction.pb.h"
+#include "meshwright/v1/worker.pb.h"
+
+#include "coordinator/dispatch/scheduling_pass.h"
+#include "coordinator/store/job_store.h"
+
+namespace meshwright {
+
+// The coordinator's side of the worker protocol, without a network. Who holds which job is in the JobStore alone, so
+// any coordinator answers any worker. One thread takes turns: all calls that came since the turn before are answered
+// from one look at the open jobs, and what they change is written in one transaction; calls that find nothing new wait
+// without a thread of their own. Thread-safe.
+class WorkerService {
+ public:
+  using Answer = std::function<void(absl::StatusOr<v1::SynchronizeResponse>)>;
+
+  // `store` outlives it.
+  WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store);
+  ~WorkerService();
+
+  // Answers up to request.wait_timeout_seconds later, while there is nothing that the worker does not know; from
+  // another thread, and exactly once. InvalidArgument names the field. Returns the call's number.
+  int64_t Synchronize(const v1::SynchronizeRequest& request, Answer answer);
+  // The caller does not wait any more: the answer is Cancelled, unless there was one already.
+  void Abandon(int64_t call);
+  // The same for callers that wait; `cancelled` is asked now and then.
+  absl::StatusOr<v1::SynchronizeResponse> Synchronize(const v1::SynchronizeRequest& request,
+                                                      const std::function<bool()>& cancelled);
+
+  // The worker finishes what it holds and is given nothing more, by any coordinator (others notice within a second),
+  // until its process is another one. Repeating it is harmless. NotFound: no such worker is known.
+  absl::Status Drain(const std::string& worker);
+
+  // There may be new jobs in the store.
+  void Wake();
+  // Called after each turn with each reconstruction that has new results, or blobs that could not be read.
+  void SetListener(std::function<void(const std::string& reconstruction)> listener);
+
+  int LeasesIn(const std::string& reconstruction) const;
+  // What blocks its jobs: none of the workers is large enough, or there is none.
+  std::vector<std::string> WarningsFor(const std::string& reconstruction) const;
+  // Those of all coordinators, as of the last turns.
+  v1::ListWorkersResponse ListWorkers() const;
+  // What runs now, as attempts without ends; "" means of all reconstructions.
+  std::vector<v1::Attempt> RunningIn(const std::string& reconstruction) const;
+  // Everybody who waits gets an answer now.
+  void Shutdown();
+
+ private:
+  struct Call {
+    int64_t number = 0;
+    v1::SynchronizeRequest request;
+    Answer answer;
+    std::chrono::steady_clock::time_point deadline;
+    bool is_heard = false;
+    bool is_settled = false;  // the worker waits to hear that something was taken
+  };
+  // What a worker has to be told of a reconstruction beside its jobs.
+  struct Background {
+    std::string options_json;
+    std::string scene_blob;
+  };
+
+  void Run();
+  void Turn();
+  absl::Status TakeTurn(std::list<Call>& calls);
+  absl::Status Apply(SchedulingPass& plan, const std::vector<WorkerRecord>& heartbeats, absl::Time now);
+  std::vector<WorkerRecord> Heartbeats(const std::list<Call>& calls, absl::Time now);
+  absl::Status LookAtWorkers(absl::Time now);
+  absl::StatusOr<v1::CameraJob> FullJob(const OpenJob& job);
+  absl::StatusOr<Background> BackgroundOf(const std::string& reconstruction);
+  absl::StatusOr<v1::SynchronizeResponse> AnswerTo(const Call& call, const std::vector<const OpenJob*>& held);
+  void Publish(const SchedulingPass& plan, absl::Time now);
+
+  const LeaseOptions lease_;
+  const RetryOptions retry_;
+  JobStore& store_;
+
+  // Of the thread alone.
+  std::map<std::pair<std::string, SequenceNumber>, CameraJob> claimed_;  // jobs that are leased from here, with specs
+  std::map<std::string, Background> backgrounds_;
+  std::map<std::string, WorkerRecord> written_workers_;
+  absl::Time last_turn_ = absl::InfinitePast();
+  absl::Time silence_counts_from_ = absl::InfinitePast();
+  absl::Time last_look_at_workers_ = absl::InfinitePast();
+
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::list<Call> calls_;  // that wait; taken out while a turn deals with them
+  std::vector<int64_t> abandoned_;
+  std::function<void(const std::string&)> listener_;
+  bool awake_ = false;
+  bool workers_changed_ = false;  // in the store, by other ways than heartbeats from here
+  bool stopping_ = false;
+  int64_t next_call_ = 1;
+  std::vector<OpenJob> seen_;  // as of the last turn
+  std::map<std::string, WorkerRecord> workers_;
+  absl::Time seen_at_ = absl::InfinitePast();
+  std::thread thread_;
+};
+
+}  // namespace meshwright

@@ -1,0 +1,41 @@
+#include <algorithm>
+#include <cstdio>
+#include <optional>
+#include <thread>
+
+#include "common/program/console.h"
+#include "common/program/parse_program.h"
+#include "common/program/program_options.h"
+#include "coordinator/main/coordinator_options.h"
+
+namespace {
+
+constexpr double kShutdownSeconds = 5;
+
+int Serve(const meshwright::CoordinatorSettings& settings) {
+  const auto program = meshwright::CoordinatorProgram::Start(settings);
+  if (!program.ok()) return meshwright::Fail(program.status());
+  std::printf("listening on port %d\n", (*program)->port());
+  if (const int port = (*program)->rest_port(); port > 0) std::printf("HTTP on port %d\n", port);
+  if (const int port = (*program)->metrics_port(); port > 0) std::printf("metrics on port %d\n", port);
+  std::fflush(stdout);
+  meshwright::WaitForStopSignal();
+  (*program)->Shutdown(absl::Seconds(kShutdownSeconds));
+  return meshwright::kExitDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace meshwright;
+  KeepMemoryLow();
+  BlockStopSignals();
+  CLI::App program("Meshwright's coordinator: decides which camera is processed next, accepts surfaces, makes meshes.",
+                   "meshwright-coordinator");
+  CoordinatorSettings settings;
+  settings.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  AddCoordinatorOptions(program, settings);
+  if (const std::optional<int> over = ParseProgram(program, argc, argv)) return *over;
+  if (settings.data_folder.empty()) return FailWrongUse("--data is required (--help shows what is expected)");
+  return Serve(settings);
+}

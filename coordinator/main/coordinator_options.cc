@@ -1,0 +1,53 @@
+#include "coordinator/main/coordinator_options.h"
+
+#include "common/program/program_options.h"
+
+namespace meshwright {
+
+void AddRestOptions(CLI::App& program, CoordinatorSettings& settings) {
+  NameInEnvironment(
+      program
+          .add_option("--rest-listen", settings.rest_listen,
+                      "host:port for the REST interface and the dashboard; port 0 takes a free one [none]")
+          ->capture_default_str());
+  NameInEnvironment(program.add_option("--dashboard", settings.page_folder,
+                                       "folder with the dashboard's files [where they are installed]"));
+  NameInEnvironment(program.add_option("--api-token-file", settings.api_token_file,
+                                       "file with the token that callers over HTTP have to show [none is asked for]"));
+}
+
+void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings) {
+  NameInEnvironment(program
+                        .add_option("--listen", settings.listen,
+                                    "host:port for workers and clients; port 0 takes a free one. There is no "
+                                    "authentication yet: only listen where everybody is trusted")
+                        ->capture_default_str());
+  NameInEnvironment(program.add_option("--data", settings.data_folder, "folder for state, uploads and meshes"));
+  NameInEnvironment(program.add_option(
+      "--store", settings.store, "sqlite:PATH or postgresql://USER@HOST:PORT/DATABASE [sqlite in the data folder]"));
+  NameInEnvironment(
+      program.add_option("--blobs", settings.blobs,
+                         "folder or s3://BUCKET/PREFIX for surfaces and photographs; S3 takes AWS_ACCESS_KEY_ID, "
+                         "AWS_SECRET_ACCESS_KEY, AWS_REGION and AWS_ENDPOINT_URL [in the data "
+                         "folder]"));
+  NameInEnvironment(program
+                        .add_option("--scene-root", settings.scene_roots,
+                                    "folders that scenes may be taken from by reference, with \":\" between them")
+                        ->delimiter(':'));
+  NameInEnvironment(program.add_option("--coordinator-threads", settings.threads, "cores for acceptance and joining")
+                        ->check(CLI::Range(1, 1024))
+                        ->capture_default_str());
+  NameInEnvironment(
+      program.add_option("--lease-seconds", settings.lease_seconds, "a worker that is silent longer has lost its jobs")
+          ->check(CLI::Range(0.1, 3600.0))
+          ->capture_default_str());
+  NameInEnvironment(program
+                        .add_option("--job-time-limit-seconds", settings.job_time_limit_seconds,
+                                    "a camera that takes longer counts as failed")
+                        ->check(CLI::Range(1.0, 1e6))
+                        ->capture_default_str());
+  AddRestOptions(program, settings);
+  AddMetricsOption(program, settings.metrics_listen);
+}
+
+}  // namespace meshwright

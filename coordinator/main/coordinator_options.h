@@ -1,0 +1,14 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "coordinator/main/coordinator_program.h"
+
+namespace meshwright {
+
+// All settings of meshwright-coordinator.
+void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings);
+// --rest-listen and what belongs to it; AddCoordinatorOptions has them.
+void AddRestOptions(CLI::App& program, CoordinatorSettings& settings);
+
+}  // namespace meshwright

@@ -1,0 +1,145 @@
+#include "coordinator/main/coordinator_program.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include "pipeline/config/parse_config.h"
+
+#include "common/base/clock.h"
+#include "common/base/status_macros.h"
+#include "common/base/thread_pool.h"
+#include "common/blob/blob_store.h"
+#include "common/blob/open_blob_store.h"
+#include "common/telemetry/log.h"
+#include "common/telemetry/measured_blob_store.h"
+#include "common/telemetry/metrics.h"
+#include "common/telemetry/metrics_server.h"
+#include "coordinator/api/reconstruction_service.h"
+#include "coordinator/dispatch/worker_service.h"
+#include "coordinator/grpc/grpc_server.h"
+#include "coordinator/main/open_job_store.h"
+#include "coordinator/main/open_rest.h"
+#include "coordinator/rest/rest_server.h"
+#include "coordinator/store/job_store.h"
+#include "coordinator/telemetry/cluster_gauges.h"
+#include "coordinator/telemetry/measured_sql_database.h"
+#include "coordinator/telemetry/rpc_metrics.h"
+
+namespace meshwright {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Another coordinator takes over so long after this one has died.
+constexpr absl::Duration kConductorLease = absl::Seconds(5);
+
+// The same for every process on this data folder, and no other.
+std::string NameOf(const std::string& data_folder) {
+  char host[256] = "";
+  if (::gethostname(host, sizeof(host) - 1) != 0) host[0] = '\0';
+  std::error_code error;
+  const fs::path path = fs::canonical(data_folder, error);
+  return absl::StrCat(host, ":", error ? data_folder : path.string());
+}
+
+class RealCoordinatorProgram final : public CoordinatorProgram {
+ public:
+  explicit RealCoordinatorProgram(const CoordinatorSettings& settings)
+      : settings_(settings),
+        lease_{.lease = absl::Seconds(settings.lease_seconds),
+               .job_time_limit = absl::Seconds(settings.job_time_limit_seconds)},
+        pool_(settings.threads) {}
+
+  ~RealCoordinatorProgram() override { Shutdown(absl::Seconds(1)); }
+
+  absl::Status Open() {
+    MW_RETURN_IF_ERROR(lease_.Validate());
+    std::error_code error;
+    fs::create_directories(settings_.data_folder, error);
+    if (error) {
+      return absl::PermissionDeniedError(
+          absl::StrCat(settings_.data_folder, ": cannot make the folder: ", error.message()));
+    }
+    const std::string& data = settings_.data_folder;
+    const std::string where =
+        settings_.store.empty() ? absl::StrCat("sqlite:", data, "/state.sqlite") : settings_.store;
+    MW_ASSIGN_OR_RETURN(store_, OpenJobStore(where, [this](std::unique_ptr<SqlDatabase> database) {
+                          auto measured = std::make_unique<MeasuredSqlDatabase>(std::move(database), metrics_, log_);
+                          database_ = measured.get();
+                          return measured;
+                        }));
+    MW_ASSIGN_OR_RETURN(unmeasured_blobs_,
+                        OpenBlobStore(settings_.blobs.empty() ? absl::StrCat(data, "/blobs") : settings_.blobs));
+    blobs_ = std::make_unique<MeasuredBlobStore>(*unmeasured_blobs_, metrics_);
+    workers_ = std::make_unique<WorkerService>(lease_, retry_, *store_);
+    const DriverEnvironment environment = {.store = store_.get(),
+                                           .blobs = blobs_.get(),
+                                           .clock = &clock_,
+                                           .pool = &pool_,
+                                           .jobs_changed = [this] { workers_->Wake(); },
+                                           .parse_config = ParseConfig,
+                                           .max_failures = retry_.max_failures};
+    MW_ASSIGN_OR_RETURN(reconstructions_,
+                        ReconstructionService::Open({.data_folder = data,
+                                                     .scene_roots = settings_.scene_roots,
+                                                     .name = NameOf(data),
+                                                     .conductor_lease = std::min(lease_.lease, kConductorLease)},
+                                                    environment, *workers_));
+    GrpcServer::Interceptors interceptors;
+    interceptors.push_back(MakeRpcMetrics(metrics_));
+    MW_ASSIGN_OR_RETURN(
+        server_, GrpcServer::Start(settings_.listen, *reconstructions_, *workers_, *blobs_, std::move(interceptors)));
+    MW_ASSIGN_OR_RETURN(rest_server_, OpenRest(settings_, *reconstructions_, *workers_, *blobs_, *store_));
+    MW_RETURN_IF_ERROR(ServeMetrics());
+    return absl::OkStatus();
+  }
+
+  int port() const override { return server_->port(); }
+  int rest_port() const override { return rest_server_ != nullptr ? rest_server_->port() : 0; }
+  int metrics_port() const override { return metrics_server_ != nullptr ? metrics_server_->port() : 0; }
+
+  void Shutdown(absl::Duration deadline) override {
+    if (rest_server_ != nullptr) rest_server_->Shutdown();
+    if (server_ != nullptr) server_->Shutdown(deadline);
+  }
+
+ private:
+  absl::Status ServeMetrics() {
+    if (settings_.metrics_listen.empty()) return absl::OkStatus();
+    AddClusterGauges(metrics_, *database_, *workers_, settings_.data_folder);
+    const auto ready = [this] { return database_->Now().status(); };
+    MW_ASSIGN_OR_RETURN(metrics_server_, MetricsServer::Start(settings_.metrics_listen, metrics_, ready));
+    return absl::OkStatus();
+  }
+
+  const CoordinatorSettings settings_;
+  const LeaseOptions lease_;
+  const RetryOptions retry_;
+  const RealClock clock_;
+  Metrics metrics_{"coordinator"};
+  const Logger log_ = Logger::ToStderr();
+  ThreadPool pool_;
+  std::unique_ptr<JobStore> store_;
+  SqlDatabase* database_ = nullptr;  // the store's
+  std::unique_ptr<BlobStore> unmeasured_blobs_;
+  std::unique_ptr<BlobStore> blobs_;
+  std::unique_ptr<WorkerService> workers_;
+  std::unique_ptr<ReconstructionService> reconstructions_;
+  std::unique_ptr<GrpcServer> server_;
+  std::unique_ptr<RestServer> rest_server_;  // null: none
+  std::unique_ptr<MetricsServer> metrics_server_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<CoordinatorProgram>> CoordinatorProgram::Start(const CoordinatorSettings& settings) {
+  auto program = std::make_unique<RealCoordinatorProgram>(settings);
+  MW_RETURN_IF_ERROR(program->Open());
+  return program;
+}
+
+}  // namespace meshwright

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <absl/status/statusor.h>
+
+#include "coordinator/store/job_store.h"
+#include "coordinator/store/sql_database.h"
+
+namespace meshwright {
+
+// "sqlite:PATH" or "postgresql://USER@HOST:PORT/DATABASE". InvalidArgument for anything else.
+absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where, const WrapSqlDatabase& wrap = nullptr);
+
+}  // namespace meshwright

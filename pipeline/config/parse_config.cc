@@ -1,0 +1,24 @@
+#include "pipeline/config/parse_config.h"
+
+#include "pipeline/options/parse_options.h"
+
+#include "common/base/status_macros.h"
+#include "worker/job_input/camera_job_input.h"
+
+namespace meshwright {
+
+absl::StatusOr<ReconstructionConfig> ParseConfig(const std::string& options_json) {
+  MW_ASSIGN_OR_RETURN(const ReconstructionOptions options, ParseOptions(options_json));
+  ReconstructionConfig config = {.options_json = ToJson(options).dump(),
+                                 .max_image_size = options.max_image_size,
+                                 .conductor = options.conductor,
+                                 .join = options.join};
+  config.job_bytes = [job = options.job](const CameraJobSpec& spec, const std::vector<Camera>& cameras) {
+    const CameraJobOptions reduced = Reduced(job, spec.reduction);
+    return EstimateInputBytes(spec, cameras, reduced.lattice_step) +
+           EstimateCameraJobBytes(cameras[static_cast<size_t>(spec.camera)], reduced);
+  };
+  return config;
+}
+
+}  // namespace meshwright

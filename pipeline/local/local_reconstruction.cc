@@ -1,0 +1,291 @@
+#include "pipeline/local/local_reconstruction.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/time/clock.h>
+
+#include "pipeline/local/report.h"
+#include "pipeline/local/work_folder.h"
+
+#include "common/base/bad_input.h"
+#include "common/base/clock.h"
+#include "common/base/files.h"
+#include "common/base/process_usage.h"
+#include "common/base/status_macros.h"
+#include "common/mesh/surface_mesh.h"
+#include "common/scene/scene_check.h"
+#include "common/scene/view.h"
+#include "coordinator/conductor/accepted_mesh.h"
+#include "worker/job_input/view_cache.h"
+
+namespace meshwright {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// What decoded photographs may take that no job uses at the moment: twice what the running jobs hold, whatever the
+// number of cameras, and at most a quarter of the memory limit.
+int64_t ViewCacheBytes(const std::vector<Camera>& cameras, const ReconstructionOptions& options,
+                       const LocalSettings& settings) {
+  int64_t largest = 0;
+  for (const Camera& camera : cameras) largest = std::max(largest, SamplingImageBytes(camera.width, camera.height));
+  const int64_t views_in_use =
+      int64_t{ConcurrentJobs(options, settings.threads)} * (options.conductor.targets.max_targets + 1);
+  return std::min(settings.memory_limit_bytes / 4, 2 * views_in_use * largest);
+}
+
+// Whether files can be made beside `path`: better known before hours of work than after.
+absl::Status CheckWritable(const std::string& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": a folder; the name of a file expected"));
+  }
+  return AtomicFile::Create(path).status();
+}
+
+// What a process killed while it wrote `path` left beside it.
+void RemovePartialFiles(const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  const std::string prefix = fs::path(path).filename().string() + ".partial-";
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
+    if (entry.path().filename().string().rfind(prefix, 0) == 0) fs::remove(entry.path(), error);
+  }
+}
+
+// NNNN_name.ply, in the order of commits.
+std::string PartName(const Scene& scene, const AcceptedSurface& surface) {
+  std::string name = fs::path(scene.views[static_cast<size_t>(surface.camera)].name).stem().string();
+  for (char& c : name) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-';
+    if (!plain) c = '_';
+  }
+  return absl::StrFormat("%04d_%s.ply", surface.sequence, name);
+}
+
+absl::Status MakePartsFolder(const std::string& path) {
+  std::error_code error;
+  fs::create_directory(path, error);
+  if (error) return absl::PermissionDeniedError(absl::StrCat(path, ": cannot make the folder: ", error.message()));
+  return absl::OkStatus();
+}
+
+absl::Status WriteParts(const Scene& scene, const std::vector<AcceptedSurface>& surfaces, BlobStore& blobs,
+                        const std::string& folder) {
+  for (const AcceptedSurface& accepted : surfaces) {
+    MW_ASSIGN_OR_RETURN(const PatchLattice surface, LoadAcceptedSurface(blobs, accepted));
+    MW_RETURN_IF_ERROR(WriteSurfacePart(surface, absl::StrCat(folder, "/", PartName(scene, accepted))));
+  }
+  return absl::OkStatus();
+}
+
+std::string DescribeNothing(const ReportTotals& totals, const ReconstructionOptions& options) {
+  return absl::StrFormat(
+      "nothing was reconstructed: %d seeds, %d rays grown, %d filtered, none supported by %d other cameras; are the "
+      "cameras right, and do the photographs show the same surface?",
+      totals.seeds, totals.rays_grown, totals.rays_filtered, options.conductor.acceptance.k_a);
+}
+
+Json PairsToJson(const Conductor& conductor) {
+  const FeasiblePairCounts& counts = conductor.pair_counts();
+  const bool points = conductor.feasibility_source() == FeasibilitySource::kSparsePoints;
+  return {{"from", points ? "sparse points" : "optical axes"},
+          {"feasible", counts.feasible},
+          {"cameras_without_pair", counts.cameras_without_pair}};
+}
+
+class LocalReconstruction {
+ public:
+  LocalReconstruction(const Scene& scene, const ReconstructionOptions& options, const LocalSettings& settings,
+                      const CameraJobFunction& job, const ProgressListener& listener)
+      : scene_(scene), options_(options), settings_(settings), job_(job), listener_(listener) {}
+
+  absl::StatusOr<Json> Run() {
+    MW_RETURN_IF_ERROR(options_.Validate());
+    MW_RETURN_IF_ERROR(CheckWritable(settings_.output_path));
+    MW_RETURN_IF_ERROR(CheckWritable(settings_.report_path));
+    if (!settings_.parts_folder.empty()) MW_RETURN_IF_ERROR(MakePartsFolder(settings_.parts_folder));
+    MW_RETURN_IF_ERROR(OpenWorkFolder());
+    RemovePartialFiles(settings_.output_path);
+    RemovePartialFiles(settings_.report_path);
+    MW_RETURN_IF_ERROR(OpenConductor());
+    MW_RETURN_IF_ERROR(RunJobs());
+    MW_ASSIGN_OR_RETURN(Json report, WriteResults());
+    if (!settings_.keep_work_folder) {
+      conductor_.reset();
+      MW_RETURN_IF_ERROR(work_->Remove());
+    }
+    return report;
+  }
+
+ private:
+  void Tell(LocalStage stage, int done, int total) {
+    progress_.stage = stage;
+    progress_.done = done;
+    progress_.total = total;
+    listener_(progress_);
+  }
+
+  absl::Status OpenWorkFolder() {
+    const auto photographs = static_cast<int>(scene_.views.size());
+    Tell(LocalStage::kChecking, 0, photographs);
+    MW_ASSIGN_OR_RETURN(const std::string digest, CheckAndDigestScene(scene_, pool_, [&](int checked) {
+                          Tell(LocalStage::kChecking, checked, photographs);
+                        }));
+    MW_ASSIGN_OR_RETURN(
+        work_, WorkFolder::Open(settings_.work_folder, digest, ToJson(options_).dump(), settings_.restart, clock_));
+    return absl::OkStatus();
+  }
+
+  absl::Status OpenConductor() {
+    Tell(LocalStage::kPairs, 0, 0);
+    for (const SceneView& view : scene_.views) {
+      cameras_.push_back(UndistortedCamera(view, options_.max_image_size));
+    }
+    absl::StatusOr<std::unique_ptr<Conductor>> opened =
+        Conductor::Open(WorkFolder::kReconstructionId, cameras_, scene_.points, options_.conductor, &work_->store(),
+                        &work_->blobs(), &clock_, &pool_);
+    if (absl::IsFailedPrecondition(opened.status())) return BadInput(opened.status());
+    MW_RETURN_IF_ERROR(opened.status());
+    conductor_ = *std::move(opened);
+    progress_.resumed_from = conductor_->progress().cameras_committed;
+    return MakeCamerasReport(scene_, work_->store(), WorkFolder::kReconstructionId, &totals_).status();
+  }
+
+  absl::Status RunJobs() {
+    ViewCache views(
+        [&](CameraIndex camera) {
+          return LoadView(scene_.views[static_cast<size_t>(camera)], options_.max_image_size);
+        },
+        ViewCacheBytes(cameras_, options_, settings_));
+    const CameraJobInputMaker inputs(scene_, cameras_, views, work_->blobs(), options_.job.lattice_step);
+    JobRunner runner(scene_, inputs, options_.job, job_, *conductor_, work_->blobs(), pool_,
+                     {.concurrent_jobs = ConcurrentJobs(options_, settings_.threads),
+                      .memory_limit_bytes = settings_.memory_limit_bytes});
+    TellCameras();
+    return runner.Run([&](const CameraJobReport& report) {
+      totals_.rays += report.rays;
+      totals_.rays_covered_before += report.rays_covered_before;
+      totals_.rays_grown += report.rays_grown;
+      TellCameras();
+    });
+  }
+
+  void TellCameras() {
+    const Progress conducted = conductor_->progress();
+    const double rays = std::max<double>(1, static_cast<double>(totals_.rays));
+    progress_.share_covered = static_cast<double>(totals_.rays_covered_before) / rays;
+    progress_.share_grown = static_cast<double>(totals_.rays_grown) / rays;
+    progress_.share_accepted = static_cast<double>(conducted.patches_accepted) / rays;
+    Tell(LocalStage::kCameras, conducted.cameras_committed, conducted.cameras_total);
+  }
+
+  absl::StatusOr<Json> WriteResults() {
+    const std::vector<AcceptedSurface> surfaces = conductor_->AcceptedSurfaces();
+    Tell(LocalStage::kJoining, 0, static_cast<int>(surfaces.size()));
+    MW_ASSIGN_OR_RETURN(Json cameras,
+                        MakeCamerasReport(scene_, work_->store(), WorkFolder::kReconstructionId, &totals_));
+    if (surfaces.empty()) return absl::FailedPreconditionError(DescribeNothing(totals_, options_));
+    if (!settings_.parts_folder.empty()) {
+      MW_RETURN_IF_ERROR(WriteParts(scene_, surfaces, work_->blobs(), settings_.parts_folder));
+    }
+    if (settings_.accepted_listener) {
+      for (const AcceptedSurface& surface : surfaces) {
+        MW_ASSIGN_OR_RETURN(const PatchLattice accepted, LoadAcceptedSurface(work_->blobs(), surface));
+        settings_.accepted_listener(accepted);
+      }
+    }
+    const auto count = static_cast<int>(surfaces.size());
+    int loaded = 0;  // each at least twice
+    const auto loading = [&] { Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count); };
+    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts, WriteAcceptedMesh(surfaces, work_->blobs(), options_.join,
+                                                                         settings_.output_path, pool_, loading));
+    Json report = MakeReport(counts, std::move(cameras));
+    MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, report.dump(2) + "\n"));
+    Tell(LocalStage::kJoining, count, count);
+    return report;
+  }
+
+  Json MakeReport(const JoinedMeshCounts& counts, Json cameras) const {
+    const ProcessUsage usage = MeasureProcessUsage();
+    Json report;
+    report["program"] = absl::StrCat("meshwright ", MW_VERSION);
+    report["mesh"] = {{"path", settings_.output_path},
+                      {"vertices", counts.vertices},
+                      {"faces", counts.faces},
+                      {"patches_trimmed", counts.patches_trimmed},
+                      {"border_edges_before", counts.border_edges_before},
+                      {"border_edges_after", counts.border_edges_after},
+                      {"stitch_faces", counts.stitch_faces},
+                      {"holes_filled", counts.holes_filled},
+                      {"hole_faces", counts.hole_faces},
+                      {"components_removed", counts.components_removed},
+                      {"faces_simplified", counts.faces_simplified},
+                      {"area", counts.area}};
+    report["scene"] = {{"format", scene_.format},
+                       {"photographs", scene_.views.size()},
+                       {"sparse_points", scene_.points.size()},
+                       {"pairs", PairsToJson(*conductor_)}};
+    report["options"] = ToJson(options_);
+    report["options"].erase("version");
+    report["totals"] = std::move(cameras["totals"]);
+    // Of this process; a resumed reconstruction's earlier processes took theirs.
+    report["process"] = {{"threads", settings_.threads},
+                         {"cameras_done_before", progress_.resumed_from},
+                         {"wall_seconds", absl::ToDoubleSeconds(absl::Now() - start_)},
+                         {"cpu_seconds", usage.cpu_seconds},
+                         {"peak_memory_bytes", usage.peak_rss_bytes}};
+    report["cameras"] = std::move(cameras["cameras"]);
+    return report;
+  }
+
+  const Scene& scene_;
+  const ReconstructionOptions& options_;
+  const LocalSettings& settings_;
+  const CameraJobFunction& job_;
+  const ProgressListener& listener_;
+  const absl::Time start_ = absl::Now();
+  RealClock clock_;
+  ThreadPool pool_{settings_.threads};
+  std::vector<Camera> cameras_;
+  std::unique_ptr<WorkFolder> work_;
+  std::unique_ptr<Conductor> conductor_;
+  ReportTotals totals_;
+  LocalProgress progress_;
+};
+
+}  // namespace
+
+std::string NameOf(LocalStage stage) {
+  switch (stage) {
+    case LocalStage::kChecking:
+      return "checking photographs";
+    case LocalStage::kPairs:
+      return "finding pairs";
+    case LocalStage::kCameras:
+      return "cameras";
+    case LocalStage::kJoining:
+      return "joining the mesh";
+  }
+  return "";
+}
+
+int ConcurrentJobs(const ReconstructionOptions& options, int threads) {
+  return std::max(1, std::min(options.conductor.window, threads));
+}
+
+absl::StatusOr<Json> ReconstructLocally(const Scene& scene, const ReconstructionOptions& options,
+                                        const LocalSettings& settings, const CameraJobFunction& job,
+                                        const ProgressListener& listener) {
+  return LocalReconstruction(scene, options, settings, job, listener).Run();
+}
+
+}  // namespace meshwright

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include <absl/status/statusor.h>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/local/job_runner.h"
+#include "pipeline/options/reconstruction_options.h"
+
+#include "common/scene/scene.h"
+#include "common/surface/patch_lattice.h"
+
+namespace meshwright {
+
+// Where a reconstruction's files go and what it may use. Nothing here changes the mesh.
+struct LocalSettings {
+  std::string output_path;               // the mesh, PLY
+  std::string report_path;               // report.json
+  std::string parts_folder;              // one PLY per reference camera; "": none
+  std::string work_folder;               // state and surfaces
+  bool restart = false;                  // throw away what the work folder holds
+  bool keep_work_folder = false;         // do not remove it at the end
+  int threads = 1;                       // cores to use, >= 1
+  int64_t memory_limit_bytes = 1 << 30;  // how many jobs run at the same time follows from it
+  // Told of every accepted surface M_r before the mesh is written; may be empty.
+  std::function<void(const PatchLattice&)> accepted_listener;
+};
+
+enum class LocalStage { kChecking, kPairs, kCameras, kJoining };
+std::string NameOf(LocalStage stage);
+
+// What a progress display can show.
+struct LocalProgress {
+  LocalStage stage = LocalStage::kChecking;
+  int done = 0;  // photographs checked, cameras committed
+  int total = 0;
+  int resumed_from = 0;       // cameras that were committed before this process started
+  double share_covered = 0;   // of the rays of the cameras processed so far: covered by accepted surfaces before,
+  double share_grown = 0;     // grown,
+  double share_accepted = 0;  // accepted
+};
+using ProgressListener = std::function<void(const LocalProgress&)>;  // one call at a time, from any thread
+
+// The whole of section 3 of Jancosek et al. 2009 in one process: scene in, mesh and report.json out. May be killed at
+// any moment; called again with the same scene and options it goes on from the last commit and writes the same bytes.
+// Returns the report. Errors marked BadInput are the scene's.
+absl::StatusOr<nlohmann::ordered_json> ReconstructLocally(const Scene& scene, const ReconstructionOptions& options,
+                                                          const LocalSettings& settings, const CameraJobFunction& job,
+                                                          const ProgressListener& listener);
+
+// How many jobs may run at the same time: a job more than the window is never there, and cores beyond one per job help
+// inside jobs.
+int ConcurrentJobs(const ReconstructionOptions& options, int threads);
+
+}  // namespace meshwright

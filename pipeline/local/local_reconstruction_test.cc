@@ -1,0 +1,192 @@
+#include "pipeline/local/local_reconstruction.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
+#include <mutex>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/base/bad_input.h"
+#include "common/base/check.h"
+#include "common/base/files.h"
+#include "common/image/encode.h"
+
+namespace meshwright {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kCameras = 12;
+constexpr double kWallDepth = 10;
+
+// Cameras side by side in front of a wall; photographs are there but nobody looks at them: the job is a quick one.
+class LocalReconstructionTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = testing::TempDir() + "local_XXXXXX";
+    MW_CHECK(mkdtemp(pattern.data()) != nullptr);
+    folder_ = pattern;
+    for (int i = 0; i < kCameras; ++i) {
+      SceneView view;
+      view.name = std::string("v") + static_cast<char>('a' + i);
+      view.image_path = folder_ + "/" + view.name + ".png";
+      view.lens = {.width = 64, .height = 48, .fx = 100, .fy = 100, .cx = 32, .cy = 24};
+      view.cam_from_world.translation = {-static_cast<double>(i), 0, 0};
+      MW_CHECK(WritePng(view.image_path, {64, 48, std::vector<uint8_t>(3 * 64 * 48, static_cast<uint8_t>(i))}).ok());
+      scene_.views.push_back(view);
+    }
+    for (double x = -3; x < kCameras + 2; x += 0.25) {
+      for (double y = -2; y <= 2; y += 0.5) {
+        SparsePoint point;
+        point.x_in_world = {x, y, kWallDepth};
+        for (CameraIndex i = 0; i < kCameras; ++i) {
+          if (std::abs(x - i) < 3.1) point.seen_by.push_back(i);
+        }
+        if (point.seen_by.size() >= 2) scene_.points.push_back(point);
+      }
+    }
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  LocalSettings Settings(const std::string& name, int threads) const {
+    return {.output_path = folder_ + "/" + name + ".ply",
+            .report_path = folder_ + "/" + name + ".report.json",
+            .work_folder = folder_ + "/" + name + ".work",
+            .threads = threads};
+  }
+
+  // The wall wherever nothing was accepted yet.
+  CameraJobResult QuickJob(const CameraJobInput& input) {
+    const int now = ++running_;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      most_running_ = std::max(most_running_, now);
+    }
+    CameraJobResult result;
+    result.filtered =
+        PatchLattice::Empty(input.reference.camera_index, input.reference.camera, options_.job.lattice_step);
+    PatchLattice& surface = result.filtered;
+    result.report.rays = surface.lattice.nodes();
+    for (size_t node = 0; node < surface.depth.size(); ++node) {
+      if (input.accepted.depth[node] > 0) {
+        ++result.report.rays_covered_before;
+        continue;
+      }
+      surface.depth[node] = static_cast<float>(kWallDepth);
+      surface.normal_in_world[node] = {0, 0, -1};
+      surface.rgb[node] = {static_cast<uint8_t>(input.targets.size()), static_cast<uint8_t>(node & 0xFFU), 0};
+      const auto column = static_cast<int>(node) % surface.lattice.columns;
+      const auto row = static_cast<int>(node) / surface.lattice.columns;
+      if (column + 1 < surface.lattice.columns && !(input.accepted.depth[node + 1] > 0)) {
+        surface.links[node] |= PatchLattice::kLinkRight;
+      }
+      const size_t below = node + static_cast<size_t>(surface.lattice.columns);
+      if (row + 1 < surface.lattice.rows && !(input.accepted.depth[below] > 0)) {
+        surface.links[node] |= PatchLattice::kLinkDown;
+      }
+      ++result.report.rays_grown;
+    }
+    ++jobs_;
+    --running_;
+    return result;
+  }
+
+  absl::StatusOr<nlohmann::ordered_json> Run(const LocalSettings& settings) {
+    return ReconstructLocally(
+        scene_, options_, settings, [this](const CameraJobInput& input, ThreadPool&) { return QuickJob(input); },
+        [this](const LocalProgress& progress) { last_progress_ = progress; });
+  }
+
+  std::string folder_;
+  Scene scene_;
+  ReconstructionOptions options_;
+  LocalProgress last_progress_;
+  std::atomic<int> jobs_{0};
+  std::atomic<int> running_{0};
+  std::mutex mutex_;
+  int most_running_ = 0;
+};
+
+TEST_F(LocalReconstructionTest, SameBytesWithAnyNumberOfThreads) {
+  const auto one = Run(Settings("one", 1));
+  ASSERT_TRUE(one.ok()) << one.status();
+  EXPECT_EQ(most_running_, 1);
+  EXPECT_EQ(jobs_, kCameras);
+  EXPECT_EQ((*one)["totals"]["cameras_processed"], kCameras);
+  EXPECT_EQ(last_progress_.stage, LocalStage::kJoining);
+  for (const int threads : {2, 8}) {
+    const auto more = Run(Settings("more", threads));
+    ASSERT_TRUE(more.ok()) << more.status();
+    EXPECT_LE(most_running_, options_.conductor.window);
+    EXPECT_TRUE(*ReadFile(folder_ + "/one.ply") == *ReadFile(folder_ + "/more.ply"));
+    EXPECT_EQ((*one)["totals"], (*more)["totals"]);
+  }
+  EXPECT_FALSE(fs::exists(folder_ + "/one.work"));
+}
+
+TEST_F(LocalReconstructionTest, WithLittleMemoryOneJobRunsAtATime) {
+  LocalSettings settings = Settings("low", 4);
+  settings.memory_limit_bytes = 1;
+  ASSERT_TRUE(Run(settings).ok());
+  EXPECT_EQ(most_running_, 1);
+}
+
+TEST_F(LocalReconstructionTest, GoesOnAfterAPhotographWasGoneForAWhile) {
+  ASSERT_TRUE(Run(Settings("whole", 2)).ok());
+  const int jobs_of_a_whole_run = jobs_;
+
+  // Gone after the check at the beginning, before the jobs need it.
+  jobs_ = 0;
+  const std::string path = scene_.views[6].image_path;
+  LocalSettings settings = Settings("broken", 2);
+  settings.memory_limit_bytes = 1;  // nothing decoded is kept
+  const auto broken = ReconstructLocally(
+      scene_, options_, settings,
+      [&](const CameraJobInput& input, ThreadPool&) {
+        if (jobs_ == 3) fs::rename(path, path + ".away");
+        return QuickJob(input);
+      },
+      [](const LocalProgress&) {});
+  ASSERT_FALSE(broken.ok());
+  EXPECT_TRUE(IsBadInput(broken.status()));
+  EXPECT_THAT(std::string(broken.status().message()), testing::HasSubstr(path));
+  EXPECT_FALSE(fs::exists(folder_ + "/broken.ply"));
+
+  fs::rename(path + ".away", path);
+  const auto resumed = Run(Settings("broken", 2));
+  ASSERT_TRUE(resumed.ok()) << resumed.status();
+  EXPECT_GT((*resumed)["process"]["cameras_done_before"], 0);
+  EXPECT_TRUE(*ReadFile(folder_ + "/whole.ply") == *ReadFile(folder_ + "/broken.ply"));
+  EXPECT_LT(jobs_, 2 * jobs_of_a_whole_run);
+}
+
+TEST_F(LocalReconstructionTest, NothingReconstructedIsAFailureThatSaysWhy) {
+  const auto nothing = ReconstructLocally(
+      scene_, options_, Settings("nothing", 1),
+      [&](const CameraJobInput& input, ThreadPool&) {
+        CameraJobResult result;
+        result.filtered =
+            PatchLattice::Empty(input.reference.camera_index, input.reference.camera, options_.job.lattice_step);
+        return result;
+      },
+      [](const LocalProgress&) {});
+  ASSERT_FALSE(nothing.ok());
+  EXPECT_THAT(std::string(nothing.status().message()), testing::HasSubstr("nothing was reconstructed"));
+  EXPECT_FALSE(fs::exists(folder_ + "/nothing.ply"));
+}
+
+TEST_F(LocalReconstructionTest, AChangedPhotographIsAnotherScene) {
+  LocalSettings settings = Settings("mesh", 1);
+  settings.keep_work_folder = true;
+  ASSERT_TRUE(Run(settings).ok());
+  ASSERT_TRUE(WritePng(scene_.views[0].image_path, {64, 48, std::vector<uint8_t>(3 * 64 * 48, 99)}).ok());
+  const auto refused = Run(settings);
+  EXPECT_TRUE(absl::IsFailedPrecondition(refused.status())) << refused.status();
+  EXPECT_THAT(std::string(refused.status().message()), testing::HasSubstr("the scene"));
+}
+
+}  // namespace
+}  // namespace meshwright

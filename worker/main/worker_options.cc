@@ -1,0 +1,28 @@
+#include "worker/main/worker_options.h"
+
+#include "common/program/program_options.h"
+
+namespace meshwright {
+
+void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {
+  NameInEnvironment(program.add_option("--coordinator", settings.coordinator, "its host:port")->capture_default_str());
+  NameInEnvironment(program.add_option("--worker-id", settings.id, "unique [host name and process]"));
+  NameInEnvironment(program.add_option(
+      "--blobs", settings.blobs,
+      "the coordinator's folder of blobs where it is shared, or s3://BUCKET/PREFIX [through the coordinator]"));
+  NameInEnvironment(program.add_option("--cores", settings.cores, "jobs at the same time, and cores for all of them")
+                        ->check(CLI::Range(1, 1024))
+                        ->capture_default_str());
+  NameInEnvironment(
+      program
+          .add_option("--memory", settings.memory_mib, "MiB for all jobs together [512 for each core, at least 1024]")
+          ->check(CLI::Range(int64_t{64}, int64_t{1} << 30)));
+  NameInEnvironment(program
+                        .add_option("--drain-seconds", settings.drain_seconds,
+                                    "after SIGTERM, jobs may take so long before they are released")
+                        ->check(CLI::Range(0.0, 86400.0))
+                        ->capture_default_str());
+  AddMetricsOption(program, settings.metrics_listen);
+}
+
+}  // namespace meshwright

@@ -1,0 +1,96 @@
+#include "worker/main/worker_program.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include "common/base/clock.h"
+#include "common/base/status_macros.h"
+#include "common/blob/open_blob_store.h"
+#include "common/telemetry/log.h"
+#include "common/telemetry/measured_blob_store.h"
+#include "common/telemetry/metrics.h"
+#include "common/telemetry/metrics_server.h"
+#include "worker/agent/agent.h"
+#include "worker/agent/grpc_coordinator.h"
+#include "worker/main/parse_job_config.h"
+#include "worker/telemetry/measured_worker_channel.h"
+
+namespace meshwright {
+namespace {
+
+int64_t MemoryMib(const WorkerSettings& settings) {
+  return settings.memory_mib > 0 ? settings.memory_mib : std::max<int64_t>(1024, int64_t{512} * settings.cores);
+}
+
+class RealWorkerProgram final : public WorkerProgram {
+ public:
+  RealWorkerProgram(const WorkerSettings& settings, std::unique_ptr<GrpcCoordinator> coordinator,
+                    std::unique_ptr<BlobStore> shared_blobs)
+      : id_(settings.id.empty() ? DefaultWorkerId() : settings.id),
+        log_(Logger::ToStderr().With({{"worker", id_}})),
+        coordinator_(std::move(coordinator)),
+        shared_blobs_(std::move(shared_blobs)),
+        metrics_("worker"),
+        channel_(*coordinator_, metrics_, clock_),
+        blobs_(shared_blobs_ != nullptr ? *shared_blobs_ : *coordinator_, metrics_),
+        agent_(
+            {.worker_id = id_,
+             .version = MW_VERSION,
+             .cores = settings.cores,
+             .memory_bytes = MemoryMib(settings) << 20,
+             .drain = absl::Seconds(settings.drain_seconds),
+             .ran_out_of_memory = settings.ran_out_of_memory},
+            channel_, blobs_, ParseJobConfig,
+            [](const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
+              return RunCameraJob(input, options, pool);
+            },
+            log_) {}
+
+  absl::Status ServeMetrics(const std::string& address) {
+    MW_ASSIGN_OR_RETURN(metrics_server_, MetricsServer::Start(address, metrics_, [this] { return channel_.Ready(); }));
+    return absl::OkStatus();
+  }
+
+  void Run() override { agent_.Run(); }
+  int metrics_port() const override { return metrics_server_ != nullptr ? metrics_server_->port() : 0; }
+  void Drain() override {
+    log_.Info("draining");
+    agent_.Drain();
+  }
+
+ private:
+  const std::string id_;
+  const Logger log_;
+  const std::unique_ptr<GrpcCoordinator> coordinator_;
+  const std::unique_ptr<BlobStore> shared_blobs_;
+  const RealClock clock_;
+  Metrics metrics_;
+  MeasuredWorkerChannel channel_;
+  MeasuredBlobStore blobs_;
+  Agent agent_;
+  std::unique_ptr<MetricsServer> metrics_server_;
+};
+
+}  // namespace
+
+std::string DefaultWorkerId() {
+  char host[64] = "worker";
+  if (::gethostname(host, sizeof(host) - 1) != 0) host[0] = '\0';
+  return absl::StrCat(host, "-", ::getpid());
+}
+
+absl::StatusOr<std::unique_ptr<WorkerProgram>> WorkerProgram::Make(const WorkerSettings& settings) {
+  std::unique_ptr<BlobStore> shared_blobs;
+  if (!settings.blobs.empty()) {
+    MW_ASSIGN_OR_RETURN(shared_blobs, OpenBlobStore(settings.blobs));
+  }
+  auto program = std::make_unique<RealWorkerProgram>(settings, GrpcCoordinator::Connect(settings.coordinator),
+                                                     std::move(shared_blobs));
+  if (!settings.metrics_listen.empty()) MW_RETURN_IF_ERROR(program->ServeMetrics(settings.metrics_listen));
+  return program;
+}
+
+}  // namespace meshwright
