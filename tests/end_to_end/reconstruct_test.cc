@@ -68,7 +68,7 @@ TEST(ReconstructTest, SameBytesWhenKilledAndResumed) {
   const double whole_run =
       RunMeshwright({"reconstruct", SharedScene("small"), "-o", folder / "timed.ply", "--quiet"}).seconds;
   std::mt19937 random(20090929);
-  std::uniform_real_distribution<double> share(0.05, 0.75);
+  std::uniform_real_distribution<double> share(0.05, 0.4);  // the measured run may have been slowed by others
   int kills = 0;
   RunResult result;
   for (int i = 0; i < 8; ++i) {

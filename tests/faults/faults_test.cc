@@ -3,6 +3,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <random>
 #include <string>
@@ -225,10 +226,11 @@ class SmallDisk {
   }
   bool mounted() const { return mounted_; }
   const std::string& path() const { return path_; }
-  // Leaves less than this.
+  // Leaves less than this. Others may write meanwhile and fill it first, so that a failing write is what is wanted too.
   void Fill(uintmax_t bytes_left) const {
     const uintmax_t free = fs::space(path_).available;
-    if (free > bytes_left) WriteBytes(path_ + "/ballast", std::string(free - bytes_left, 'x'));
+    if (free > bytes_left) std::ofstream(path_ + "/ballast") << std::string(free - bytes_left, 'x');
+    EXPECT_LE(fs::space(path_).available, bytes_left);
   }
   void Empty() const { fs::remove(path_ + "/ballast"); }
 
