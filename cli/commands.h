@@ -17,6 +17,8 @@ namespace meshwright {
 using Run = std::function<int()>;
 void AddReconstructCommand(CLI::App& program, Run& run);
 void AddInspectCommand(CLI::App& program, Run& run);
+// evaluate, synthesize, render: they need tools/, and a build without it has commands of these names that say so.
+void AddToolCommands(CLI::App& program, Run& run);
 void AddEvaluateCommand(CLI::App& program, Run& run);
 void AddSynthesizeCommand(CLI::App& program, Run& run);
 void AddRenderCommand(CLI::App& program, Run& run);

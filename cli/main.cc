@@ -23,9 +23,7 @@ int main(int argc, char** argv) {
   Run run;
   AddReconstructCommand(program, run);
   AddInspectCommand(program, run);
-  AddEvaluateCommand(program, run);
-  AddSynthesizeCommand(program, run);
-  AddRenderCommand(program, run);
+  AddToolCommands(program, run);
   AddOptionsCommand(program, run);
   AddUpCommand(program, run);
   AddSubmitCommand(program, run);

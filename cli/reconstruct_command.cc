@@ -8,16 +8,11 @@
 #include <unistd.h>
 
 #include "pipeline/local/local_reconstruction.h"
-#include "tools/loss_accounting/loss_accounting.h"
 
 #include "cli/commands.h"
+#include "cli/loss_follower.h"
 #include "cli/progress_display.h"
-#include "common/base/bad_input.h"
 #include "common/base/clock.h"
-#include "common/base/files.h"
-#include "common/base/status_macros.h"
-#include "common/mesh/ply.h"
-#include "common/scene/view.h"
 
 namespace meshwright {
 namespace {
@@ -70,30 +65,6 @@ void PrintSummary(const nlohmann::ordered_json& report, const LocalSettings& set
               FormatBytes(process["peak_memory_bytes"].get<double>()).c_str());
 }
 
-absl::StatusOr<std::unique_ptr<LossAccounting>> FollowLosses(const Arguments& arguments, const Scene& scene,
-                                                             ThreadPool& pool) {
-  const absl::StatusOr<TriangleMesh> ground_truth = ReadPly(arguments.ground_truth);
-  if (!ground_truth.ok()) return BadInput(ground_truth.status());
-  if (const absl::Status usable = LossAccounting::Check(*ground_truth); !usable.ok()) {
-    return BadInput(absl::InvalidArgumentError(absl::StrCat(arguments.ground_truth, ": ", usable.message())));
-  }
-  std::vector<Camera> cameras;
-  for (const SceneView& view : scene.views) {
-    cameras.push_back(UndistortedCamera(view, arguments.options.max_image_size));
-  }
-  return std::make_unique<LossAccounting>(*ground_truth, std::move(cameras), arguments.options.job.lattice_step, pool);
-}
-
-// Compares the mesh with the ground truth and adds the losses to report.json.
-absl::Status AccountForLosses(const LossAccounting& losses, const LocalSettings& settings, ThreadPool& pool,
-                              nlohmann::ordered_json& report) {
-  MW_ASSIGN_OR_RETURN(const TriangleMesh mesh, ReadPly(settings.output_path));
-  const LossReport lost = losses.Account(mesh, pool);
-  report["losses"] = ToJson(lost);
-  std::fputs(ToText(lost).c_str(), stderr);
-  return WriteFileAtomically(settings.report_path, report.dump(2) + "\n");
-}
-
 int Reconstruct(Arguments& arguments) {
   LocalSettings& settings = arguments.settings;
   if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
@@ -115,17 +86,13 @@ int Reconstruct(Arguments& arguments) {
     return RunCameraJob(input, arguments.options.job, pool);
   };
   ThreadPool losses_pool(settings.threads);
-  std::unique_ptr<LossAccounting> losses;
+  std::unique_ptr<LossFollower> losses;
   if (!arguments.ground_truth.empty()) {
-    absl::StatusOr<std::unique_ptr<LossAccounting>> followed = FollowLosses(arguments, *scene, losses_pool);
+    absl::StatusOr<std::unique_ptr<LossFollower>> followed =
+        FollowLosses(arguments.ground_truth, *scene, arguments.options, losses_pool);
     if (!followed.ok()) return Fail(followed.status());
     losses = *std::move(followed);
-    job = [&](const CameraJobInput& input, ThreadPool& pool) {
-      PatchStacks grown;
-      CameraJobResult result = RunFollowedCameraJob(input, arguments.options.job, grown, pool);
-      losses->RecordJob(input, arguments.options.job, grown, result.filtered, pool);
-      return result;
-    };
+    job = [&](const CameraJobInput& input, ThreadPool& pool) { return losses->RunJob(input, pool); };
     settings.accepted_listener = [&](const PatchLattice& accepted) { losses->RecordAccepted(accepted); };
   }
   absl::StatusOr<nlohmann::ordered_json> report = ReconstructLocally(
@@ -133,8 +100,7 @@ int Reconstruct(Arguments& arguments) {
   display.End();
   if (!report.ok()) return Fail(report.status());
   if (losses != nullptr) {
-    const absl::Status accounted = AccountForLosses(*losses, settings, losses_pool, *report);
-    if (!accounted.ok()) return Fail(accounted);
+    if (const absl::Status accounted = losses->Account(settings, *report); !accounted.ok()) return Fail(accounted);
   }
   if (arguments.output.json) {
     report->erase("cameras");

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/local/job_runner.h"
+#include "pipeline/local/local_progress.h"
 #include "pipeline/options/reconstruction_options.h"
 
 #include "common/scene/scene.h"
@@ -28,21 +29,6 @@ struct LocalSettings {
   // Told of every accepted surface M_r before the mesh is written; may be empty.
   std::function<void(const PatchLattice&)> accepted_listener;
 };
-
-enum class LocalStage { kChecking, kPairs, kCameras, kJoining };
-std::string NameOf(LocalStage stage);
-
-// What a progress display can show.
-struct LocalProgress {
-  LocalStage stage = LocalStage::kChecking;
-  int done = 0;  // photographs checked, cameras committed
-  int total = 0;
-  int resumed_from = 0;       // cameras that were committed before this process started
-  double share_covered = 0;   // of the rays of the cameras processed so far: covered by accepted surfaces before,
-  double share_grown = 0;     // grown,
-  double share_accepted = 0;  // accepted
-};
-using ProgressListener = std::function<void(const LocalProgress&)>;  // one call at a time, from any thread
 
 // The whole of section 3 of Jancosek et al. 2009 in one process: scene in, mesh and report.json out. May be killed at
 // any moment; called again with the same scene and options it goes on from the last commit and writes the same bytes.
