@@ -11,6 +11,7 @@
 int main(int argc, char** argv) {
   using namespace meshwright;
   KeepMemoryLow();
+  IgnoreFileSizeSignal();
   CLI::App program(
       "Meshwright turns photographs with known cameras into a triangle mesh (Jancosek, Shekhovtsov, "
       "Pajdla: Scalable Multi-View Stereo, 2009).",

@@ -28,17 +28,27 @@ struct Arguments {
   int workers = 1;
 };
 
+// Where this machine reaches what listens at `listen`: all addresses (0.0.0.0, [::]) include the loopback one, and
+// every other is reached by itself.
+std::string OwnAddress(const std::string& listen, int port) {
+  std::string host = listen.substr(0, listen.rfind(':'));
+  if (host.empty() || host == "0.0.0.0" || host == "*") host = "127.0.0.1";
+  if (host == "[::]") host = "[::1]";
+  return absl::StrCat(host, ":", port);
+}
+
 int Up(Arguments& arguments) {
   BlockStopSignals();
   CoordinatorSettings& settings = arguments.coordinator;
   settings.threads = AvailableCores();
+  KeepFilesPrivate();
   if (settings.blobs.empty()) settings.blobs = settings.data_folder + "/blobs";
   const auto coordinator = CoordinatorProgram::Start(settings);
   if (!coordinator.ok()) return Fail(coordinator.status());
   std::vector<std::unique_ptr<WorkerProgram>> workers;
   std::vector<std::thread> threads;
   for (int i = 0; i < arguments.workers; ++i) {
-    auto worker = WorkerProgram::Make({.coordinator = absl::StrCat("127.0.0.1:", (*coordinator)->port()),
+    auto worker = WorkerProgram::Make({.coordinator = OwnAddress(settings.listen, (*coordinator)->port()),
                                        .id = absl::StrCat("local-", i + 1),
                                        .blobs = settings.blobs,
                                        .cores = std::max(1, AvailableCores() / arguments.workers),

@@ -18,6 +18,7 @@ namespace meshwright {
 namespace {
 
 constexpr size_t kBufferBytes = size_t{1} << 20;
+constexpr char kPartial[] = ".partial-";  // between a file's name and its writer's number
 
 absl::Status SystemError(const std::string& what, const std::string& path, int error) {
   const std::string message = absl::StrCat(path, ": ", what, ": ", std::strerror(error));
@@ -30,6 +31,7 @@ absl::Status SystemError(const std::string& what, const std::string& path, int e
       return absl::PermissionDeniedError(message);
     case ENOSPC:
     case EDQUOT:
+    case EFBIG:
       return absl::ResourceExhaustedError(message);
     default:
       return absl::InternalError(message);
@@ -47,6 +49,21 @@ absl::Status WriteAll(int descriptor, const uint8_t* data, size_t size, const st
     size -= static_cast<size_t>(written);
   }
   return absl::OkStatus();
+}
+
+// The file that a symbolic link points at, so that writing changes that file and leaves the link; else `path`. Only
+// regular files can be replaced: InvalidArgument for folders, devices and pipes.
+absl::StatusOr<std::string> ReplaceableFile(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        path, ": ", fs::is_directory(status) ? "a folder" : "a device or pipe", "; the name of a file expected"));
+  }
+  if (!fs::is_symlink(fs::symlink_status(path, error))) return path;
+  const fs::path target = fs::weakly_canonical(path, error);
+  return error ? path : target.string();
 }
 
 }  // namespace
@@ -88,10 +105,11 @@ AtomicFile::~AtomicFile() {
   ::unlink(temporary_path_.c_str());
 }
 
-absl::StatusOr<AtomicFile> AtomicFile::Create(const std::string& path) {
+absl::StatusOr<AtomicFile> AtomicFile::Create(const std::string& asked_path) {
   static std::atomic<int> counter{0};
+  MW_ASSIGN_OR_RETURN(const std::string path, ReplaceableFile(asked_path));
   while (true) {
-    const std::string temporary = absl::StrCat(path, ".partial-", ::getpid(), "-", counter.fetch_add(1));
+    const std::string temporary = absl::StrCat(path, kPartial, ::getpid(), "-", counter.fetch_add(1));
     // Processes of several containers may share a folder and have the same number: only one of them gets the name.
     const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
     if (descriptor >= 0) return AtomicFile(path, temporary, descriptor);
@@ -149,6 +167,19 @@ absl::Status WriteFileAtomically(const std::string& path, absl::Span<const uint8
 
 absl::Status WriteFileAtomically(const std::string& path, const std::string& bytes) {
   return WriteFileAtomically(path, absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()));
+}
+
+void RemoveStalePartialFiles(const std::string& folder, absl::Duration age) {
+  namespace fs = std::filesystem;
+  const auto oldest = fs::file_time_type::clock::now() - absl::ToChronoSeconds(age);
+  std::error_code error;
+  for (auto at = fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied, error);
+       !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+    std::error_code of_file;
+    if (at->path().filename().string().find(kPartial) == std::string::npos) continue;
+    if (!at->is_regular_file(of_file) || at->last_write_time(of_file) > oldest || of_file) continue;
+    fs::remove(at->path(), of_file);
+  }
 }
 
 }  // namespace meshwright

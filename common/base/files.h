@@ -7,6 +7,7 @@
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
+#include <absl/time/time.h>
 #include <absl/types/span.h>
 
 namespace meshwright {
@@ -15,7 +16,8 @@ namespace meshwright {
 absl::StatusOr<std::string> ReadFile(const std::string& path);
 
 // A file that appears whole or not at all: written beside its final name, synced, then renamed. Destroying it without
-// Commit() removes what was written.
+// Commit() removes what was written. A symbolic link stays and the file it points at is replaced; what is no regular
+// file (a folder, a device) is refused with InvalidArgument.
 class AtomicFile {
  public:
   static absl::StatusOr<AtomicFile> Create(const std::string& path);
@@ -41,5 +43,9 @@ class AtomicFile {
 
 absl::Status WriteFileAtomically(const std::string& path, const std::string& bytes);
 absl::Status WriteFileAtomically(const std::string& path, absl::Span<const uint8_t> bytes);
+
+// Removes what AtomicFiles of processes that died left in `folder` and below, when nothing was written to it for `age`.
+// Errors are ignored: it is a matter of space only.
+void RemoveStalePartialFiles(const std::string& folder, absl::Duration age);
 
 }  // namespace meshwright

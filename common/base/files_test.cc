@@ -1,9 +1,11 @@
 #include "common/base/files.h"
 
+#include <chrono>
 #include <filesystem>
 #include <string>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 namespace meshwright {
 namespace {
@@ -56,6 +58,45 @@ TEST_F(FilesTest, FolderThatDoesNotExistIsAnErrorThatNamesTheFile) {
   const absl::Status status = WriteFileAtomically((folder_ / "no" / "file").string(), std::string("x"));
   EXPECT_FALSE(status.ok());
   EXPECT_NE(status.ToString().find("no/file"), std::string::npos);
+}
+
+TEST_F(FilesTest, ALinkStaysAndItsTargetIsReplaced) {
+  const std::string target = (folder_ / "target").string();
+  const std::string link = (folder_ / "link").string();
+  ASSERT_TRUE(WriteFileAtomically(target, std::string("before")).ok());
+  fs::create_symlink("target", link);
+  ASSERT_TRUE(WriteFileAtomically(link, std::string("after")).ok());
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(*ReadFile(target), "after");
+  const std::string to_nothing = (folder_ / "to_nothing").string();
+  fs::create_symlink("made", to_nothing);
+  ASSERT_TRUE(WriteFileAtomically(to_nothing, std::string("new")).ok());
+  EXPECT_EQ(*ReadFile((folder_ / "made").string()), "new");
+}
+
+TEST_F(FilesTest, WhatIsNoFileIsNotReplaced) {
+  const std::string pipe = (folder_ / "pipe").string();
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& path : {pipe, folder_.string(), std::string("/dev/null")}) {
+    EXPECT_EQ(WriteFileAtomically(path, std::string("x")).code(), absl::StatusCode::kInvalidArgument) << path;
+  }
+  EXPECT_TRUE(fs::is_fifo(pipe));
+}
+
+TEST_F(FilesTest, OnlyStalePartialFilesAreRemoved) {
+  fs::create_directories(folder_ / "ab");
+  const fs::path stale = folder_ / "ab" / "blob.partial-12-0";
+  const fs::path fresh = folder_ / "ab" / "blob.partial-13-0";
+  const fs::path whole = folder_ / "ab" / "blob";
+  for (const fs::path& path : {stale, fresh, whole})
+    ASSERT_TRUE(WriteFileAtomically(path.string(), std::string("x")).ok());
+  const auto two_days_ago = fs::file_time_type::clock::now() - std::chrono::hours(48);
+  fs::last_write_time(stale, two_days_ago);
+  fs::last_write_time(whole, two_days_ago);
+  RemoveStalePartialFiles(folder_.string(), absl::Hours(24));
+  EXPECT_FALSE(fs::exists(stale));
+  EXPECT_TRUE(fs::exists(fresh));
+  EXPECT_TRUE(fs::exists(whole));
 }
 
 }  // namespace

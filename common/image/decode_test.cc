@@ -177,6 +177,20 @@ TEST(DecodeImage, OtherKindsOfJpegBecomeRgb) {
             DecodeImageBytes(OtherJpeg(image, false, false, 2), "x").value().rgb);
 }
 
+TEST(DecodeImage, AJpegWhoseScanHeaderLibjpegOnlyWarnsOfIsRead) {
+  const ColorImage image = Picture(40, 30);
+  const std::string bytes = EncodeJpeg(image, 90);
+  const size_t scan = bytes.find("\xFF\xDA");
+  ASSERT_NE(scan, std::string::npos);
+  const size_t spectral_end = scan + 5 + 2 * static_cast<size_t>(bytes[scan + 4]) + 1;
+  ASSERT_EQ(bytes[spectral_end], 63);  // of 0..63, what sequential scans have
+  std::string unusual = bytes;
+  unusual[spectral_end] = 0;
+  const absl::StatusOr<ColorImage> decoded = DecodeImageBytes(unusual, "x");
+  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  EXPECT_EQ(decoded->rgb, DecodeImageBytes(bytes, "x").value().rgb);
+}
+
 TEST(DecodeImage, PnmWithCommentsAndDepths) {
   EXPECT_EQ(DecodeImageBytes("P6\n# a comment\n1 1\n255\n\x01\x02\x03", "x").value().rgb,
             (std::vector<uint8_t>{1, 2, 3}));

@@ -30,11 +30,14 @@ void LeaveWithError(j_common_ptr info) {
 }
 
 // libjpeg only warns of data that end early or do not decode, and goes on with grey: here that is an error. Warnings
-// about headers and about padding before a marker, which some cameras write, are harmless.
+// about headers (of scans too) and about padding before a marker, which some cameras write, are harmless.
 void HandleMessage(j_common_ptr info, int level) {
   if (level >= 0) return;
   const int code = info->err->msg_code;
-  if (code == JWRN_EXTRANEOUS_DATA || code == JWRN_ADOBE_XFORM || code == JWRN_JFIF_MAJOR) return;
+  if (code == JWRN_EXTRANEOUS_DATA || code == JWRN_ADOBE_XFORM || code == JWRN_JFIF_MAJOR ||
+      code == JWRN_NOT_SEQUENTIAL || code == JWRN_BOGUS_PROGRESSION) {
+    return;
+  }
   LeaveWithError(info);
 }
 

@@ -20,6 +20,8 @@ namespace {
 // Longer lines do not occur in headers; noise has them.
 constexpr size_t kLongestLine = 4096;
 constexpr size_t kShownBytes = 40;
+// More of them, comments included, do not occur either; each name is compared with those before.
+constexpr int kMostLines = 1000;
 
 std::optional<ScalarType> ParseScalarType(const std::string& name) {
   static constexpr std::pair<std::string_view, ScalarType> kNames[] = {
@@ -45,6 +47,7 @@ class Lines {
 
   absl::StatusOr<std::string> Next(const std::string& expected) {
     ++number_;
+    if (number_ > kMostLines) return Error("one more", absl::StrCat("at most ", kMostLines, " lines"));
     const size_t end = bytes_.find('\n', offset_);
     if (end == std::string::npos || end - offset_ > kLongestLine) {
       return Error(bytes_.substr(offset_, kLongestLine), expected);

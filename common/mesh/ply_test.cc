@@ -312,5 +312,14 @@ TEST(ReadPly, RealGroundTruth) {
   ExpectSound(*mesh);
 }
 
+// A header of a megabyte in which each name is compared with all before would take minutes.
+TEST(ReadPly, HeadersAreReadInLinearTime) {
+  std::string bytes = "ply\nformat ascii 1.0\nelement vertex 0\n";
+  for (int i = 0; i < 100'000; ++i) absl::StrAppend(&bytes, "property float p", i, "\n");
+  const std::string path = testing::TempDir() + "/many_properties.ply";
+  ASSERT_TRUE(WriteFileAtomically(path, bytes + "end_header\n").ok());
+  EXPECT_THAT(std::string(ReadPly(path).status().message()), testing::HasSubstr("expected at most 1000 lines"));
+}
+
 }  // namespace
 }  // namespace meshwright

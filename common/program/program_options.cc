@@ -10,6 +10,7 @@
 #include <absl/strings/str_cat.h>
 #include <malloc.h>
 #include <pthread.h>
+#include <sys/stat.h>
 
 namespace meshwright {
 namespace {
@@ -61,6 +62,10 @@ void ParseWithEnvironment(CLI::App& program, int argc, char** argv) {
   std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
   program.parse(arguments);
 }
+
+void IgnoreFileSizeSignal() { std::signal(SIGXFSZ, SIG_IGN); }
+
+void KeepFilesPrivate() { ::umask(S_IRWXG | S_IRWXO); }
 
 void KeepMemoryLow() {
   mallopt(M_MMAP_THRESHOLD, 1 << 20);

@@ -22,6 +22,13 @@ void ParseWithEnvironment(CLI::App& program, int argc, char** argv);
 // memory would be that of the largest job times the number of threads; so large blocks always go back to the system.
 void KeepMemoryLow();
 
+// A file beyond the limit of the shell (ulimit -f) is then an error of that write, as on a full disk, not the end of
+// the process.
+void IgnoreFileSizeSignal();
+
+// Files and folders made from here on belong to their owner alone (0600, 0700).
+void KeepFilesPrivate();
+
 // To be called before any thread is started: SIGINT and SIGTERM are from then on only seen by WaitForStopSignal().
 void BlockStopSignals();
 int WaitForStopSignal();

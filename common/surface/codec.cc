@@ -18,6 +18,7 @@
 #include "common/base/check.h"
 #include "common/base/little_endian.h"
 #include "common/base/status_macros.h"
+#include "common/geometry/camera_bounds.h"
 
 namespace meshwright {
 namespace {
@@ -31,6 +32,9 @@ constexpr size_t kPatchBytes = 24;
 constexpr size_t kChecksumBytes = 4;
 // Larger lattices are refused, so that bytes from outside cannot ask for any amount of memory.
 constexpr int64_t kMostNodes = int64_t{1} << 28;
+
+constexpr float kLongestNormal = 1.01F;
+constexpr float kLargestQuality = 1e6F;
 
 // Nodes first .. first + length - 1 have a patch; the ones before and behind have none.
 struct Run {
@@ -173,8 +177,18 @@ absl::Status CheckPatches(const SparseSurface& surface) {
   size_t below = 0;  // the first patch at the node below or behind it
   for (size_t patch = 0; patch < patches; ++patch) {
     const int32_t node = surface.node[patch];
-    if (!(surface.depth[patch] > 0) || std::isinf(surface.depth[patch])) {
-      return Bad(absl::StrCat("depth of node ", node), surface.depth[patch], "a finite number above 0");
+    if (!(surface.depth[patch] > kNearest && surface.depth[patch] < kFarthest)) {
+      return Bad(absl::StrCat("depth of node ", node), surface.depth[patch],
+                 absl::StrCat("a number in ", kNearest, "..", kFarthest));
+    }
+    // Normals are directions; bounded and finite is what averaging them needs.
+    if (!(surface.normal_in_world[patch].cwiseAbs().maxCoeff() < kLongestNormal)) {
+      return Bad(absl::StrCat("normal of node ", node), surface.normal_in_world[patch].cwiseAbs().maxCoeff(),
+                 "a unit vector");
+    }
+    if (!(std::abs(surface.quality[patch]) <= kLargestQuality)) {
+      return Bad(absl::StrCat("quality of node ", node), surface.quality[patch],
+                 absl::StrCat("at most ", kLargestQuality));
     }
     while (below < patches && surface.node[below] < node + columns) ++below;
     const uint8_t links = surface.links[patch];
@@ -255,6 +269,11 @@ absl::StatusOr<SparseSurface> DecodeSparseSurface(const std::string& bytes) {
   if (width < 0 || height < 0) return Bad("image size", absl::StrCat(width, " x ", height), "no negative numbers");
   if (step < 1) return Bad("lattice step", step, "at least 1");
   const Camera camera = CameraFrom(width, height, numbers);
+  if (patches > 0) {
+    if (const absl::Status sound = CheckCamera(camera); !sound.ok()) {
+      return absl::DataLossError(absl::StrCat("surface: ", sound.message()));
+    }
+  }
   const Lattice lattice = Lattice::For(camera, step);
   if (columns != lattice.columns || rows != lattice.rows || lattice.nodes() > kMostNodes) {
     return Bad("lattice", absl::StrCat(columns, " x ", rows),

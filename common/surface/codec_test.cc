@@ -1,11 +1,14 @@
 #include "common/surface/codec.h"
 
+#include <cmath>
 #include <random>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
+#include "common/base/little_endian.h"
 #include "common/surface/random_surface_testing.h"
 
 namespace meshwright {
@@ -142,6 +145,37 @@ TEST(SurfaceCodec, NoiseIsDataLoss) {
     std::string noise(i * 13, '\0');
     for (char& c : noise) c = static_cast<char>(random());
     EXPECT_EQ(DecodeSurface(noise).status().code(), absl::StatusCode::kDataLoss);
+  }
+}
+
+// `bytes` with `value` at `offset` and the checksum that belongs to it: what a malicious writer makes.
+template <typename T>
+std::string Forged(std::string bytes, size_t offset, T value) {
+  StoreLittleEndian(value, bytes.data() + offset);
+  const size_t covered = bytes.size() - 4;
+  const uLong crc = ::crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(covered));
+  StoreLittleEndian(static_cast<uint32_t>(crc), bytes.data() + covered);
+  return bytes;
+}
+
+TEST(SurfaceCodec, NumbersThatNoCameraHasAreDataLoss) {
+  const std::string bytes = EncodeSurface(RandomSurface(6, SmallCamera(13, 7), 1, 1, 1));
+  constexpr size_t kCameraNumbers = 56;
+  ASSERT_TRUE(DecodeSurface(Forged(bytes, kCameraNumbers, LoadLittleEndian<double>(&bytes[kCameraNumbers]))).ok());
+  for (size_t number = 0; number < 16; ++number) {
+    for (const double value : {1e300, -1e300, std::nan("")}) {
+      const absl::Status status = DecodeSurface(Forged(bytes, kCameraNumbers + 8 * number, value)).status();
+      EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << number << ": " << value;
+    }
+  }
+  for (const size_t focal : {0, 1}) EXPECT_FALSE(DecodeSurface(Forged(bytes, kCameraNumbers + 8 * focal, 0.0)).ok());
+  constexpr size_t kDepths = 192 + 8;  // behind the header and the one run
+  for (const float depth : {0.0F, 1e30F, -1.0F, std::nanf("")}) {
+    EXPECT_FALSE(DecodeSurface(Forged(bytes, kDepths, depth)).ok()) << depth;
+  }
+  constexpr size_t kNormals = kDepths + size_t{4} * 13 * 7;
+  for (const float coordinate : {2.0F, std::nanf("")}) {
+    EXPECT_FALSE(DecodeSurface(Forged(bytes, kNormals, coordinate)).ok()) << coordinate;
   }
 }
 

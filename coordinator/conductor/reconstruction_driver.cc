@@ -285,12 +285,12 @@ absl::Status ReconstructionDriver::RunAgain(SequenceNumber sequence, const std::
 
 absl::Status ReconstructionDriver::Join(const ReconstructionConfig& config, Conductor& conductor) {
   MW_RETURN_IF_ERROR(SetState(ReconstructionState::kJoining));
-  if (conductor.AcceptedSurfaces().empty()) {
-    return BadInput(absl::FailedPreconditionError(
-        absl::StrCat("nothing was reconstructed: no surface was supported by ", config.conductor.acceptance.k_a,
-                     " other cameras; are the cameras right, and do the photographs show the same surface?")));
-  }
+  const absl::Status nothing = BadInput(absl::FailedPreconditionError(
+      absl::StrCat("nothing was reconstructed: no surface was supported by ", config.conductor.acceptance.k_a,
+                   " other cameras; are the cameras right, and do the photographs show the same surface?")));
+  if (conductor.AcceptedSurfaces().empty()) return nothing;
   MW_ASSIGN_OR_RETURN(const StoredMesh mesh, WriteMesh(config, conductor));
+  if (mesh.faces == 0) return nothing;
   const absl::Status finished = environment_.store->FinishReconstruction(id_, mesh, environment_.clock->Now(), epoch_);
   return absl::IsFailedPrecondition(finished) ? Stopped() : finished;
 }

@@ -29,6 +29,7 @@ int Serve(const meshwright::CoordinatorSettings& settings) {
 int main(int argc, char** argv) {
   using namespace meshwright;
   KeepMemoryLow();
+  IgnoreFileSizeSignal();
   BlockStopSignals();
   CLI::App program("Meshwright's coordinator: decides which camera is processed next, accepts surfaces, makes meshes.",
                    "meshwright-coordinator");
@@ -37,5 +38,7 @@ int main(int argc, char** argv) {
   AddCoordinatorOptions(program, settings);
   if (const std::optional<int> over = ParseProgram(program, argc, argv)) return *over;
   if (settings.data_folder.empty()) return FailWrongUse("--data is required (--help shows what is expected)");
+  // Blobs elsewhere are for workers too, who may be other users.
+  if (settings.blobs.empty()) KeepFilesPrivate();
   return Serve(settings);
 }

@@ -10,6 +10,8 @@
 #include "pipeline/config/parse_config.h"
 
 #include "common/base/clock.h"
+#include "common/base/files.h"
+#include "common/base/folder_lock.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
@@ -36,6 +38,9 @@ namespace fs = std::filesystem;
 
 // Another coordinator takes over so long after this one has died.
 constexpr absl::Duration kConductorLease = absl::Seconds(5);
+
+// Nobody writes one file for so long: its writer is dead.
+constexpr absl::Duration kStalePartialFile = absl::Hours(24);
 
 // The same for every process on this data folder, and no other.
 std::string NameOf(const std::string& data_folder) {
@@ -65,6 +70,11 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
           absl::StrCat(settings_.data_folder, ": cannot make the folder: ", error.message()));
     }
     const std::string& data = settings_.data_folder;
+    // Photographs, meshes and who may see them: nobody else's business on this machine.
+    fs::permissions(data, fs::perms::owner_all, error);
+    MW_ASSIGN_OR_RETURN(FolderLock lock, FolderLock::Acquire(data));
+    data_lock_ = std::make_unique<FolderLock>(std::move(lock));
+    RemoveStalePartialFiles(data, kStalePartialFile);
     const std::string where =
         settings_.store.empty() ? absl::StrCat("sqlite:", data, "/state.sqlite") : settings_.store;
     MW_ASSIGN_OR_RETURN(store_, OpenJobStore(where, [this](std::unique_ptr<SqlDatabase> database) {
@@ -123,6 +133,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
   Metrics metrics_{"coordinator"};
   const Logger log_ = Logger::ToStderr();
   ThreadPool pool_;
+  std::unique_ptr<FolderLock> data_lock_;
   std::unique_ptr<JobStore> store_;
   SqlDatabase* database_ = nullptr;  // the store's
   std::unique_ptr<BlobStore> unmeasured_blobs_;

@@ -43,12 +43,30 @@ int64_t ViewCacheBytes(const std::vector<Camera>& cameras, const ReconstructionO
 }
 
 // Whether files can be made beside `path`: better known before hours of work than after.
-absl::Status CheckWritable(const std::string& path) {
+absl::Status CheckWritable(const std::string& path) { return AtomicFile::Create(path).status(); }
+
+// Whether `path` is one of the photographs, also by a link or by another spelling of its folder.
+absl::Status CheckIsNoPhotograph(const Scene& scene, const std::string& path) {
   std::error_code error;
-  if (fs::is_directory(path, error)) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": a folder; the name of a file expected"));
+  for (const SceneView& view : scene.views) {
+    if (fs::equivalent(path, view.image_path, error)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(path, ": a photograph of the scene; the name of another file expected"));
+    }
   }
-  return AtomicFile::Create(path).status();
+  return absl::OkStatus();
+}
+
+// A file's size and time of change: another pair means other bytes.
+struct FileStamp {
+  uintmax_t bytes = 0;
+  fs::file_time_type changed;
+  bool operator==(const FileStamp& other) const { return bytes == other.bytes && changed == other.changed; }
+};
+
+FileStamp StampOf(const std::string& path) {
+  std::error_code error;  // leaves values that no file has, and reading it will say why
+  return {fs::file_size(path, error), fs::last_write_time(path, error)};
 }
 
 // What a process killed while it wrote `path` left beside it.
@@ -110,8 +128,10 @@ class LocalReconstruction {
 
   absl::StatusOr<Json> Run() {
     MW_RETURN_IF_ERROR(options_.Validate());
-    MW_RETURN_IF_ERROR(CheckWritable(settings_.output_path));
-    MW_RETURN_IF_ERROR(CheckWritable(settings_.report_path));
+    for (const std::string& path : {settings_.output_path, settings_.report_path}) {
+      MW_RETURN_IF_ERROR(CheckIsNoPhotograph(scene_, path));
+      MW_RETURN_IF_ERROR(CheckWritable(path));
+    }
     if (!settings_.parts_folder.empty()) MW_RETURN_IF_ERROR(MakePartsFolder(settings_.parts_folder));
     MW_RETURN_IF_ERROR(OpenWorkFolder());
     RemovePartialFiles(settings_.output_path);
@@ -136,6 +156,7 @@ class LocalReconstruction {
 
   absl::Status OpenWorkFolder() {
     const auto photographs = static_cast<int>(scene_.views.size());
+    for (const SceneView& view : scene_.views) stamps_.push_back(StampOf(view.image_path));
     Tell(LocalStage::kChecking, 0, photographs);
     MW_ASSIGN_OR_RETURN(const std::string digest, CheckAndDigestScene(scene_, pool_, [&](int checked) {
                           Tell(LocalStage::kChecking, checked, photographs);
@@ -161,11 +182,8 @@ class LocalReconstruction {
   }
 
   absl::Status RunJobs() {
-    ViewCache views(
-        [&](CameraIndex camera) {
-          return LoadView(scene_.views[static_cast<size_t>(camera)], options_.max_image_size);
-        },
-        ViewCacheBytes(cameras_, options_, settings_));
+    ViewCache views([&](CameraIndex camera) { return LoadUnchangedView(camera); },
+                    ViewCacheBytes(cameras_, options_, settings_));
     const CameraJobInputMaker inputs(scene_, cameras_, views, work_->blobs(), options_.job.lattice_step);
     JobRunner runner(scene_, inputs, options_.job, job_, *conductor_, work_->blobs(), pool_,
                      {.concurrent_jobs = ConcurrentJobs(options_, settings_.threads),
@@ -177,6 +195,17 @@ class LocalReconstruction {
       totals_.rays_grown += report.rays_grown;
       TellCameras();
     });
+  }
+
+  // What was digested for the work folder and what is used must be the same.
+  absl::StatusOr<View> LoadUnchangedView(CameraIndex camera) const {
+    const auto index = static_cast<size_t>(camera);
+    const SceneView& scene_view = scene_.views[index];
+    absl::StatusOr<View> view = LoadView(scene_view, options_.max_image_size);
+    if (StampOf(scene_view.image_path) == stamps_[index]) return view;
+    return BadInput(absl::FailedPreconditionError(
+        absl::StrCat(scene_view.image_path,
+                     ": changed while it was used; photographs must stay as they are until the mesh is there")));
   }
 
   void TellCameras() {
@@ -208,6 +237,11 @@ class LocalReconstruction {
     const auto loading = [&] { Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count); };
     MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts, WriteAcceptedMesh(surfaces, work_->blobs(), options_.join,
                                                                          settings_.output_path, pool_, loading));
+    if (counts.faces == 0) {
+      std::error_code error;
+      fs::remove(settings_.output_path, error);
+      return absl::FailedPreconditionError(DescribeNothing(totals_, options_));
+    }
     Json report = MakeReport(counts, std::move(cameras));
     MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, report.dump(2) + "\n"));
     Tell(LocalStage::kJoining, count, count);
@@ -255,6 +289,7 @@ class LocalReconstruction {
   const absl::Time start_ = absl::Now();
   RealClock clock_;
   ThreadPool pool_{settings_.threads};
+  std::vector<FileStamp> stamps_;  // of the photographs, before they were digested
   std::vector<Camera> cameras_;
   std::unique_ptr<WorkFolder> work_;
   std::unique_ptr<Conductor> conductor_;

@@ -9,10 +9,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
-#include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "pipeline/options/reconstruction_options.h"
 
@@ -25,7 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kLock[] = "lock";
 constexpr char kState[] = "state.sqlite";
 constexpr char kBlobs[] = "blobs";
 
@@ -44,7 +40,7 @@ absl::Status CheckIsOurs(const std::string& path) {
   }
   const bool empty = fs::is_empty(path, error);
   if (error) return SystemError(path, "cannot look into the folder", error.value());
-  if (!empty && !fs::exists(fs::path(path) / kLock, error)) {
+  if (!empty && !fs::exists(fs::path(path) / FolderLock::kFileName, error)) {
     return absl::FailedPreconditionError(
         absl::StrCat(path, ": not empty and not a work folder; name another with --work-dir"));
   }
@@ -53,13 +49,9 @@ absl::Status CheckIsOurs(const std::string& path) {
 
 }  // namespace
 
-WorkFolder::WorkFolder(std::string path, int lock_descriptor)
-    : path_(std::move(path)), lock_descriptor_(lock_descriptor) {}
+WorkFolder::WorkFolder(std::string path, FolderLock lock) : path_(std::move(path)), lock_(std::move(lock)) {}
 
-WorkFolder::~WorkFolder() {
-  store_.reset();
-  if (lock_descriptor_ >= 0) ::close(lock_descriptor_);
-}
+WorkFolder::~WorkFolder() = default;
 
 absl::StatusOr<std::unique_ptr<WorkFolder>> WorkFolder::Open(const std::string& path, const std::string& scene_digest,
                                                              const std::string& options_json, bool restart,
@@ -68,13 +60,8 @@ absl::StatusOr<std::unique_ptr<WorkFolder>> WorkFolder::Open(const std::string& 
     return SystemError(path, "cannot make the work folder", errno);
   }
   MW_RETURN_IF_ERROR(CheckIsOurs(path));
-  const std::string lock_path = absl::StrCat(path, "/", kLock);
-  const int descriptor = ::open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (descriptor < 0) return SystemError(lock_path, "cannot create", errno);
-  auto folder = std::unique_ptr<WorkFolder>(new WorkFolder(path, descriptor));
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
-    return absl::UnavailableError(absl::StrCat(path, ": another process is working in this folder"));
-  }
+  MW_ASSIGN_OR_RETURN(FolderLock lock, FolderLock::Acquire(path));
+  auto folder = std::unique_ptr<WorkFolder>(new WorkFolder(path, std::move(lock)));
   if (restart) MW_RETURN_IF_ERROR(folder->RemoveContents());
   MW_RETURN_IF_ERROR(folder->OpenStores(scene_digest, options_json, clock));
   return folder;
@@ -126,7 +113,7 @@ absl::Status WorkFolder::RemoveContents() {
 absl::Status WorkFolder::Remove() {
   MW_RETURN_IF_ERROR(RemoveContents());
   std::error_code error;
-  fs::remove(fs::path(path_) / kLock, error);
+  fs::remove(fs::path(path_) / FolderLock::kFileName, error);
   fs::remove(path_, error);  // stays, silently, when there is something of somebody else in it
   return absl::OkStatus();
 }

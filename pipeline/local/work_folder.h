@@ -7,6 +7,7 @@
 #include <absl/status/statusor.h>
 
 #include "common/base/clock.h"
+#include "common/base/folder_lock.h"
 #include "common/blob/blob_store.h"
 #include "coordinator/store/job_store.h"
 
@@ -38,12 +39,12 @@ class WorkFolder {
   absl::Status Remove();
 
  private:
-  WorkFolder(std::string path, int lock_descriptor);
+  WorkFolder(std::string path, FolderLock lock);
   absl::Status RemoveContents();
   absl::Status OpenStores(const std::string& scene_digest, const std::string& options_json, const Clock& clock);
 
   const std::string path_;
-  int lock_descriptor_ = -1;
+  const FolderLock lock_;  // outlives the stores
   bool resumed_ = false;
   std::unique_ptr<JobStore> store_;
   std::unique_ptr<BlobStore> blobs_;

@@ -121,6 +121,43 @@ TEST(BadOutputTest, AFolderInThePlaceOfTheMesh) {
   ExpectOneLine(result, folder.path());
 }
 
+TEST(BadOutputTest, AResultWithoutAFaceIsAFailure) {
+  const TemporaryFolder folder;
+  const RunResult result = RunMeshwright(
+      {"reconstruct", SharedScene("small"), "-o", folder / "mesh.ply", "--max-image-size", "20", "--quiet"});
+  EXPECT_EQ(result.exit_code, 1);
+  ExpectOneLine(result, "nothing was reconstructed");
+  EXPECT_FALSE(fs::exists(folder / "mesh.ply"));
+}
+
+TEST(BadOutputTest, PhotographsAndDevicesAreNotReplaced) {
+  const TemporaryFolder folder;
+  const std::string scene = folder / "scene";
+  fs::copy(SharedScene("small"), scene, fs::copy_options::recursive);
+  const std::string photograph = scene + "/images/0003.png";
+  const std::string before = ReadBytes(photograph);
+  fs::create_symlink(photograph, folder / "link.ply");
+  for (const std::string& output : {photograph, scene + "/model/../images/0003.png", folder / "link.ply"}) {
+    const RunResult result = RunMeshwright({"reconstruct", scene, "-o", output, "--quiet"});
+    EXPECT_NE(result.exit_code, 0) << output;
+    EXPECT_TRUE(ReadBytes(photograph) == before) << output;
+  }
+  const RunResult device = RunMeshwright({"reconstruct", scene, "-o", "/dev/full", "--quiet"});
+  EXPECT_EQ(device.exit_code, 1);
+  ExpectOneLine(device, "/dev/full");
+  EXPECT_TRUE(fs::is_character_file("/dev/full"));
+}
+
+TEST(BadOutputTest, ALinkIsWrittenThrough) {
+  const TemporaryFolder folder;
+  WriteBytes(folder / "target.ply", "before");
+  fs::create_symlink("target.ply", folder / "link.ply");
+  const RunResult result = RunMeshwright({"reconstruct", SharedScene("small"), "-o", folder / "link.ply", "--quiet"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(fs::is_symlink(folder / "link.ply"));
+  EXPECT_EQ(ReadBytes(folder / "target.ply").substr(0, 3), "ply");
+}
+
 TEST(BadOutputTest, AFolderThatMayNotBeWritten) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
   const TemporaryFolder folder;

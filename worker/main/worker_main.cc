@@ -35,6 +35,7 @@ int Work(const meshwright::WorkerSettings& settings) {
 int main(int argc, char** argv) {
   using namespace meshwright;
   KeepMemoryLow();
+  IgnoreFileSizeSignal();
   BlockStopSignals();
   CLI::App program("Meshwright's worker: processes reference cameras for a coordinator.", "meshwright-worker");
   WorkerSettings settings;
