@@ -2,17 +2,24 @@
 
 #include <algorithm>
 #include <thread>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include "common/base/bad_input.h"
-#include "common/scene/import.h"
+#include "common/scene/formats/formats.h"
+#include "common/scene/formats/import.h"
 
 namespace meshwright {
 
 void AddFormatOption(CLI::App& command, SceneArguments& scene) {
+  std::vector<std::string> names;
+  for (const SceneFormat& format : SceneFormats()) names.emplace_back(format.name);
   command
       .add_option("--format", scene.format,
-                  "read the scene as colmap-text, colmap-binary, middlebury or strecha; without it the content tells")
-      ->check(CLI::IsMember({"colmap-text", "colmap-binary", "middlebury", "strecha"}))
+                  absl::StrCat("read the scene as ", absl::StrJoin(names, ", "), "; without it the content tells"))
+      ->check(CLI::IsMember(names))
       ->type_name("FORMAT");
 }
 

@@ -7,8 +7,8 @@
 
 #include "common/base/files.h"
 #include "common/image/encode.h"
-#include "common/scene/assemble.h"
-#include "common/scene/small_scenes.h"
+#include "common/scene/formats/assemble.h"
+#include "common/scene/formats/small_scenes.h"
 
 namespace meshwright {
 namespace {

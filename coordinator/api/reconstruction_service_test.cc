@@ -11,7 +11,7 @@
 #include "common/base/check.h"
 #include "common/blob/filesystem_blob_store.h"
 #include "common/image/encode.h"
-#include "common/scene/export_colmap.h"
+#include "common/scene/formats/export_colmap.h"
 #include "common/scene/scene_codec.h"
 #include "common/scene/view.h"
 #include "common/surface/codec.h"

@@ -12,7 +12,7 @@
 #include "common/base/relative_path.h"
 #include "common/base/status_macros.h"
 #include "common/blob/lost_blob.h"
-#include "common/scene/import.h"
+#include "common/scene/formats/import.h"
 #include "common/scene/scene_check.h"
 #include "common/scene/scene_codec.h"
 

@@ -12,7 +12,7 @@
 namespace meshwright {
 
 // What other programs link (find_package(Meshwright), target Meshwright::meshwright): ImportScene of
-// common/scene/import.h reads a scene, Reconstruct makes the mesh, ReadPly of common/mesh/ply.h reads it.
+// common/scene/formats/import.h reads a scene, Reconstruct makes the mesh, ReadPly of common/mesh/ply.h reads it.
 
 struct ReconstructionRequest {
   std::string output_path;         // the mesh, PLY; required

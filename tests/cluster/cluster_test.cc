@@ -17,7 +17,7 @@
 #include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/blob/s3_testing.h"
-#include "common/scene/import.h"
+#include "common/scene/formats/import.h"
 #include "coordinator/main/coordinator_program.h"
 #include "coordinator/store/postgres_testing.h"
 #include "worker/main/worker_program.h"

@@ -8,7 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/image/encode.h"
-#include "common/scene/export_colmap.h"
+#include "common/scene/formats/export_colmap.h"
 
 namespace meshwright::scale {
 namespace {

@@ -14,7 +14,7 @@
 #include "tools/raycast/mesh_ray_caster.h"
 
 #include "common/mesh/ply.h"
-#include "common/scene/import.h"
+#include "common/scene/formats/import.h"
 #include "common/scene/view.h"
 
 namespace meshwright {

@@ -10,7 +10,7 @@
 #include "common/base/status_macros.h"
 #include "common/image/encode.h"
 #include "common/mesh/ply.h"
-#include "common/scene/export_colmap.h"
+#include "common/scene/formats/export_colmap.h"
 
 namespace meshwright {
 namespace {

@@ -5,7 +5,7 @@
 #include "pipeline/library/library.h"
 
 #include "common/mesh/ply.h"
-#include "common/scene/import.h"
+#include "common/scene/formats/import.h"
 
 int main(int argc, char** argv) {
   if (argc != 3) return 2;

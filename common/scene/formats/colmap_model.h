@@ -11,7 +11,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include "common/scene/assemble.h"
+#include "common/scene/formats/assemble.h"
 #include "common/scene/scene.h"
 
 // What COLMAP's text and binary models share.

@@ -1,4 +1,4 @@
-#include "common/scene/colmap_text.h"
+#include "common/scene/formats/colmap_text.h"
 
 #include <limits>
 #include <utility>
@@ -6,8 +6,8 @@
 
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
-#include "common/scene/colmap_model.h"
-#include "common/scene/text_fields.h"
+#include "common/scene/formats/colmap_model.h"
+#include "common/scene/formats/text_fields.h"
 
 namespace meshwright {
 namespace {

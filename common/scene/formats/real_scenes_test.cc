@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "common/base/files.h"
-#include "common/scene/assemble.h"
-#include "common/scene/import.h"
-#include "common/scene/text_fields.h"
+#include "common/scene/formats/assemble.h"
+#include "common/scene/formats/import.h"
+#include "common/scene/formats/text_fields.h"
 #include "common/scene/view.h"
 
 namespace meshwright {

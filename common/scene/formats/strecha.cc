@@ -1,4 +1,4 @@
-#include "common/scene/strecha.h"
+#include "common/scene/formats/strecha.h"
 
 #include <utility>
 #include <vector>
@@ -7,7 +7,7 @@
 
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
-#include "common/scene/calibration_matrix.h"
+#include "common/scene/formats/calibration_matrix.h"
 
 namespace meshwright {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/scene/colmap_binary.h"
+#include "common/scene/formats/colmap_binary.h"
 
 #include <bit>
 #include <cmath>
@@ -10,8 +10,8 @@
 
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
-#include "common/scene/colmap_model.h"
-#include "common/scene/text_fields.h"
+#include "common/scene/formats/colmap_model.h"
+#include "common/scene/formats/text_fields.h"
 
 namespace meshwright {
 namespace {

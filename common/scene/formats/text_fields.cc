@@ -1,4 +1,4 @@
-#include "common/scene/text_fields.h"
+#include "common/scene/formats/text_fields.h"
 
 #include <charconv>
 #include <cmath>

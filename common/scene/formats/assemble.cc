@@ -1,4 +1,4 @@
-#include "common/scene/assemble.h"
+#include "common/scene/formats/assemble.h"
 
 #include <algorithm>
 #include <cmath>

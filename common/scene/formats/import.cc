@@ -1,4 +1,4 @@
-#include "common/scene/import.h"
+#include "common/scene/formats/import.h"
 
 #include <vector>
 
@@ -6,41 +6,15 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
-#include "common/scene/assemble.h"
-#include "common/scene/colmap_binary.h"
-#include "common/scene/colmap_model.h"
-#include "common/scene/colmap_text.h"
-#include "common/scene/middlebury.h"
-#include "common/scene/strecha.h"
+#include "common/scene/formats/assemble.h"
+#include "common/scene/formats/formats.h"
 
 namespace meshwright {
 namespace {
 
-struct Format {
-  const char* name;
-  std::string looks_for;
-  // The folder that Import takes; empty when `path` has no such scene.
-  std::string (*find)(const std::string& path);
-  absl::StatusOr<Scene> (*import)(const std::string& folder);
-};
-
-std::vector<Format> KnownFormats() {
-  return {
-      {"colmap-binary", ColmapModelFiles("bin"),
-       [](const std::string& path) { return FindColmapModelFolder(path, "bin"); }, ImportColmapBinary},
-      {"colmap-text", ColmapModelFiles("txt"),
-       [](const std::string& path) { return FindColmapModelFolder(path, "txt"); }, ImportColmapText},
-      {"middlebury", "*_par.txt",
-       [](const std::string& path) { return FilesEndingIn(path, "_par.txt").empty() ? std::string() : path; },
-       ImportMiddlebury},
-      {"strecha", "*.camera here or in cameras/",
-       [](const std::string& path) { return FindStrechaCameras(path).empty() ? std::string() : path; }, ImportStrecha},
-  };
-}
-
 absl::StatusOr<Scene> ImportForced(const std::string& path, const std::string& name) {
   std::vector<std::string> names;
-  for (const Format& format : KnownFormats()) {
+  for (const SceneFormat& format : SceneFormats()) {
     if (name == format.name) {
       const std::string folder = format.find(path);
       if (!folder.empty()) return format.import(folder);
@@ -61,13 +35,13 @@ absl::StatusOr<Scene> ImportScene(const std::string& path, const std::optional<s
   }
   if (format.has_value()) return ImportForced(path, *format);
 
-  std::vector<Format> found;
+  std::vector<SceneFormat> found;
   std::vector<std::string> looked_for;
-  for (const Format& candidate : KnownFormats()) {
+  for (const SceneFormat& candidate : SceneFormats()) {
     looked_for.push_back(absl::StrCat(candidate.looks_for, " (", candidate.name, ")"));
     if (candidate.find(path).empty()) continue;
-    const bool text_beside_binary =
-        !found.empty() && found.back().name == std::string("colmap-binary") && candidate.import == ImportColmapText;
+    const bool text_beside_binary = !found.empty() && found.back().name == std::string("colmap-binary") &&
+                                    candidate.name == std::string("colmap-text");
     if (!text_beside_binary) found.push_back(candidate);
   }
   if (found.empty()) {

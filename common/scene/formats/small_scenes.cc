@@ -1,4 +1,4 @@
-#include "common/scene/small_scenes.h"
+#include "common/scene/formats/small_scenes.h"
 
 #include <array>
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 #include "common/base/check.h"
 #include "common/image/encode.h"
-#include "common/scene/assemble.h"
+#include "common/scene/formats/assemble.h"
 
 namespace meshwright {
 namespace {

@@ -8,8 +8,8 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "common/scene/formats/text_fields.h"
 #include "common/scene/scene.h"
-#include "common/scene/text_fields.h"
 
 // What all importers share: the checks that do not depend on the format, and the last step to a Scene.
 namespace meshwright {

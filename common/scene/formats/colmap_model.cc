@@ -1,4 +1,4 @@
-#include "common/scene/colmap_model.h"
+#include "common/scene/formats/colmap_model.h"
 
 #include <filesystem>
 

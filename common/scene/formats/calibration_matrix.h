@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <absl/status/statusor.h>
 
-#include "common/scene/assemble.h"
+#include "common/scene/formats/assemble.h"
 
 namespace meshwright {
 

@@ -1,4 +1,4 @@
-#include "common/scene/calibration_matrix.h"
+#include "common/scene/formats/calibration_matrix.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "common/scene/export_colmap.h"
+#include "common/scene/formats/export_colmap.h"
 
 #include <charconv>
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
-#include "common/scene/assemble.h"
+#include "common/scene/formats/assemble.h"
 
 namespace meshwright {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "common/scene/import.h"
-#include "common/scene/small_scenes.h"
+#include "common/scene/formats/import.h"
+#include "common/scene/formats/small_scenes.h"
 #include "common/scene/view.h"
 
 namespace meshwright {

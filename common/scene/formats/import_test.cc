@@ -1,4 +1,4 @@
-#include "common/scene/import.h"
+#include "common/scene/formats/import.h"
 
 #include <filesystem>
 
@@ -6,9 +6,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/assemble.h"
-#include "common/scene/export_colmap.h"
-#include "common/scene/small_scenes.h"
+#include "common/scene/formats/assemble.h"
+#include "common/scene/formats/export_colmap.h"
+#include "common/scene/formats/small_scenes.h"
 
 namespace meshwright {
 namespace {
