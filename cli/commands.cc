@@ -13,14 +13,20 @@
 
 namespace meshwright {
 
-void AddFormatOption(CLI::App& command, SceneArguments& scene) {
+void AddSceneOptions(CLI::App& command, SceneArguments& scene) {
   std::vector<std::string> names;
   for (const SceneFormat& format : SceneFormats()) names.emplace_back(format.name);
   command
-      .add_option("--format", scene.format,
+      .add_option("--format", scene.import.format,
                   absl::StrCat("read the scene as ", absl::StrJoin(names, ", "), "; without it the content tells"))
       ->check(CLI::IsMember(names))
       ->type_name("FORMAT");
+  command
+      .add_option("--model", scene.import.model,
+                  "which of several reconstructions in the scene (sparse/N); without it the one with most photographs")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--images", scene.import.images_folder, "where the photographs are, if not in the scene's folder")
+      ->type_name("FOLDER");
 }
 
 void AddOutputOptions(CLI::App& command, OutputSettings& output) {
@@ -37,8 +43,9 @@ void AddThreadsOption(CLI::App& command, int& threads) {
 int AvailableCores() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
 absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments) {
-  absl::StatusOr<Scene> scene = ImportScene(arguments.path, arguments.format);
+  absl::StatusOr<Scene> scene = ImportScene(arguments.path, arguments.import);
   if (!scene.ok()) return BadInput(scene.status());
+  for (const std::string& warning : scene->warnings) Warn(warning);
   return scene;
 }
 

@@ -1,13 +1,13 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
 #include <absl/status/statusor.h>
 
 #include "common/program/console.h"
+#include "common/scene/formats/import_options.h"
 #include "common/scene/scene.h"
 
 namespace meshwright {
@@ -31,15 +31,16 @@ void AddServiceCommands(CLI::App& program, Run& run);
 // Options that several commands share.
 struct SceneArguments {
   std::string path;
-  std::optional<std::string> format;
+  ImportOptions import;
 };
-void AddFormatOption(CLI::App& command, SceneArguments& scene);
+// --format, --model and --images.
+void AddSceneOptions(CLI::App& command, SceneArguments& scene);
 void AddOutputOptions(CLI::App& command, OutputSettings& output);
 void AddThreadsOption(CLI::App& command, int& threads);
 
 // Cores that this process may use.
 int AvailableCores();
-// Errors are bad input.
+// Errors are bad input. What was left out of the scene is said on stderr, a line each.
 absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments);
 
 }  // namespace meshwright

@@ -66,7 +66,7 @@ void AddEvaluateCommand(CLI::App& program, Run& run) {
   command.add_option("RECONSTRUCTION", arguments->reconstruction, "mesh or point cloud, PLY")->required();
   command.add_option("GROUND_TRUTH", arguments->ground_truth, "mesh, PLY")->required();
   command.add_option("--scene", arguments->scene.path, "folder with the cameras")->required();
-  AddFormatOption(command, arguments->scene);
+  AddSceneOptions(command, arguments->scene);
   command
       .add_option("--max-image-size", arguments->max_image_size,
                   "longest side of the images at which the comparison is made, px; 0: as they are")

@@ -50,7 +50,7 @@ void AddInspectCommand(CLI::App& program, Run& run) {
   CLI::App& command = *program.add_subcommand("inspect", "Say what a scene is and what its reconstruction will take");
   command.footer(kExamples);
   command.add_option("SCENE", arguments->scene.path, "folder with cameras and photographs")->required();
-  AddFormatOption(command, arguments->scene);
+  AddSceneOptions(command, arguments->scene);
   AddThreadsOption(command, arguments->threads);
   AddOutputOptions(command, arguments->output);
   VisitOptions(arguments->options, [&](const char* group, const char* name, auto& field, const char* help) {

@@ -121,7 +121,7 @@ void AddReconstructCommand(CLI::App& program, Run& run) {
   command.footer(kExamples);
   command.add_option("SCENE", arguments->scene.path, "folder with cameras and photographs")->required();
   command.add_option("-o,--output", arguments->settings.output_path, "the mesh to write, PLY")->required();
-  AddFormatOption(command, arguments->scene);
+  AddSceneOptions(command, arguments->scene);
   command.add_flag("--parts", arguments->parts, "also write one PLY per reference camera, into OUTPUT.parts/");
   command.add_option("--work-dir", arguments->settings.work_folder,
                      "state and surfaces while it runs [OUTPUT.ply.work]; removed at the end");

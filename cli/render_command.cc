@@ -70,7 +70,7 @@ void AddRenderCommand(CLI::App& program, Run& run) {
   command.footer(kExamples);
   command.add_option("MESH", arguments->mesh, "mesh or point cloud, PLY")->required();
   command.add_option("--scene", arguments->scene.path, "folder with the cameras")->required();
-  AddFormatOption(command, arguments->scene);
+  AddSceneOptions(command, arguments->scene);
   command.add_option("--camera", arguments->camera, "name of the photograph whose camera looks")->required();
   command.add_option("-o,--output", arguments->picture, "the picture to write, PNG")->required();
   command.add_option("--orbit-deg", arguments->orbit_deg, "move the camera around what it sees, to its right, degrees")

@@ -46,7 +46,8 @@ set(public_headers
   common/geometry/rigid3.h
   common/mesh/ply.h
   common/mesh/triangle_mesh.h
-  common/scene/import.h
+  common/scene/formats/import.h
+  common/scene/formats/import_options.h
   common/scene/scene.h
   pipeline/library/library.h
   pipeline/local/local_progress.h)

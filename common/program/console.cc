@@ -24,6 +24,8 @@ int Fail(const absl::Status& status) {
   return IsBadInput(status) ? kExitBadInput : kExitFailed;
 }
 
+void Warn(const std::string& message) { PrintError("warning: " + message); }
+
 int FailWrongUse(const std::string& message) {
   PrintError(message);
   return kExitWrongUse;

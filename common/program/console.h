@@ -23,6 +23,8 @@ struct OutputSettings {
 
 // "meshwright: <message>" on stderr, one line whatever the message holds. Returns the exit code of the error.
 int Fail(const absl::Status& status);
+// "meshwright: warning: <message>" on stderr, one line.
+void Warn(const std::string& message);
 int FailWrongUse(const std::string& message);
 
 void PrintJson(const nlohmann::ordered_json& json);

@@ -31,9 +31,11 @@ struct SparsePoint {
 // What goes in: photographs with known cameras, and sparse points when structure from motion left some. Views are
 // sorted by name, points by (seen_by, x), so that a scene does not depend on the order in its files.
 struct Scene {
-  std::string format;  // "colmap-text", "colmap-binary", "middlebury", "strecha"
+  std::string format;  // the name of one of SceneFormats()
   std::vector<SceneView> views;
   std::vector<SparsePoint> points;
+  // What was left out or doubted when the scene was read, a line each; for people, no part of what the scene is.
+  std::vector<std::string> warnings = {};
 };
 
 }  // namespace meshwright

@@ -57,7 +57,7 @@ absl::StatusOr<std::string> ResolveSceneReference(const std::string& reference, 
 }
 
 absl::StatusOr<IngestedScene> IngestScene(const std::string& folder, ReferencedBlobs& blobs, ThreadPool& pool) {
-  absl::StatusOr<Scene> scene = ImportScene(folder, std::nullopt);
+  absl::StatusOr<Scene> scene = ImportScene(folder);
   if (!scene.ok()) return BadInput(scene.status());
   IngestedScene taken;
   MW_ASSIGN_OR_RETURN(taken.scene_digest, CheckAndDigestScene(*scene, pool, [](int) {}));

@@ -80,6 +80,7 @@ absl::StatusOr<Inspection> Inspect(const Scene& scene, const ReconstructionOptio
     inspection.job_bytes = std::max(inspection.job_bytes, bytes);
   }
   inspection.format = scene.format;
+  inspection.warnings = scene.warnings;
   inspection.photographs = static_cast<int>(scene.views.size());
   inspection.width = width.range();
   inspection.height = height.range();
@@ -101,6 +102,7 @@ absl::StatusOr<Inspection> Inspect(const Scene& scene, const ReconstructionOptio
 Json ToJson(const Inspection& inspection) {
   return {
       {"format", inspection.format},
+      {"warnings", inspection.warnings},
       {"photographs", inspection.photographs},
       {"width", RangeToJson(inspection.width)},
       {"height", RangeToJson(inspection.height)},

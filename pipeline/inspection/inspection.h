@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <absl/status/statusor.h>
 #include <nlohmann/json.hpp>
@@ -22,6 +23,7 @@ struct SizeRange {
 // What a scene is and what its reconstruction will take, known before any photograph is decoded.
 struct Inspection {
   std::string format;
+  std::vector<std::string> warnings;  // of the scene: what was left out of it, and other scenes in the folder
   int photographs = 0;
   SizeRange width;   // px, as used: undistorted and scaled
   SizeRange height;  // px

@@ -121,7 +121,7 @@ class ClusterTest : public testing::Test {
   // What the laptop makes of it.
   static const std::string& LocalMesh() {
     static const std::string mesh = [] {
-      const Scene scene = *ImportScene(SharedScene() + "/facade", std::nullopt);
+      const Scene scene = *ImportScene(SharedScene() + "/facade");
       const std::string path = SharedScene() + "/local.ply";
       const ReconstructionOptions options;
       const auto report = ReconstructLocally(

@@ -203,7 +203,7 @@ TEST_P(EverySyntheticKind, WhatIsWrittenReadsBack) {
   ThreadPool pool(2);
   const absl::Status written = WriteSyntheticScene(scene, folder, pool);
   ASSERT_TRUE(written.ok()) << written;
-  const auto read = ImportScene(folder, std::nullopt);
+  const auto read = ImportScene(folder);
   ASSERT_TRUE(read.ok()) << read.status();
   ASSERT_EQ(read->views.size(), scene.scene.views.size());
   EXPECT_EQ(read->points.size(), scene.scene.points.size());

@@ -1,8 +1,10 @@
 #include "common/scene/formats/assemble.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -19,6 +21,8 @@
 namespace meshwright {
 namespace {
 
+constexpr CameraIndex kDropped = -1;
+
 std::string SizeText(int width, int height) { return absl::StrCat(width, " x ", height); }
 
 // A scene's file may come from a stranger: its image names must stay within the scene's folder.
@@ -31,41 +35,28 @@ absl::Status CheckImageName(const std::string& name, const Place& place) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::string> FindImageFolder(const ImportedView& first, const std::vector<std::string>& candidates) {
-  for (const std::string& folder : candidates) {
-    if (IsFile(JoinPath(folder, first.view.name))) return folder;
-  }
-  return absl::NotFoundError(absl::StrCat(first.named_at.ToString(), ": image ", Quoted(first.view.name),
-                                          " not found; looked in ", absl::StrJoin(candidates, ", ")));
-}
-
-// Gives the view its picture; reads no more of it than the header.
-absl::Status AttachImage(const std::string& folder, ImportedView* imported) {
+// Reads no more of the view's picture than the header.
+absl::Status CheckImageSize(ImportedView* imported) {
   SceneView& view = imported->view;
-  view.image_path = JoinPath(folder, view.name);
-  const absl::StatusOr<ImageSize> size = ReadImageSize(view.image_path);
-  if (absl::IsNotFound(size.status())) {
-    return absl::NotFoundError(
-        absl::StrCat(view.image_path, ": no such image; it is named at ", imported->named_at.ToString()));
-  }
-  MW_RETURN_IF_ERROR(size.status());
+  MW_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(view.image_path));
   if (view.lens.width == 0) {
-    view.lens.width = size->width;
-    view.lens.height = size->height;
+    view.lens.width = size.width;
+    view.lens.height = size.height;
     return CheckLens(view.lens, imported->named_at);
   }
-  if (size->width != view.lens.width || size->height != view.lens.height) {
+  if (size.width != view.lens.width || size.height != view.lens.height) {
     return absl::InvalidArgumentError(
-        absl::StrCat(view.image_path, ": the picture has ", SizeText(size->width, size->height), " px; its camera (",
+        absl::StrCat(view.image_path, ": the picture has ", SizeText(size.width, size.height), " px; its camera (",
                      imported->named_at.ToString(), ") expects ", SizeText(view.lens.width, view.lens.height)));
   }
   return absl::OkStatus();
 }
 
-// `new_index[i]`: where the i-th view went.
+// `new_index[i]`: where the i-th view went; kDropped when it was dropped.
 void OrderPoints(const std::vector<CameraIndex>& new_index, std::vector<SparsePoint>* points) {
   for (SparsePoint& point : *points) {
     for (CameraIndex& camera : point.seen_by) camera = new_index[static_cast<size_t>(camera)];
+    std::erase(point.seen_by, kDropped);
     std::sort(point.seen_by.begin(), point.seen_by.end());
     point.seen_by.erase(std::unique(point.seen_by.begin(), point.seen_by.end()), point.seen_by.end());
   }
@@ -75,6 +66,118 @@ void OrderPoints(const std::vector<CameraIndex>& new_index, std::vector<SparsePo
     };
     return key(a) < key(b);
   });
+}
+
+absl::StatusOr<std::vector<size_t>> OrderOfNames(const std::vector<ImportedView>& views) {
+  std::vector<size_t> order(views.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return views[a].view.name < views[b].view.name; });
+  for (size_t i = 1; i < order.size(); ++i) {
+    const ImportedView& a = views[std::min(order[i - 1], order[i])];
+    const ImportedView& b = views[std::max(order[i - 1], order[i])];
+    if (a.view.name == b.view.name) {
+      return FieldError(b.named_at, "image name", Quoted(b.view.name),
+                        absl::StrCat("a name not used before (", a.named_at.ToString(), ")"));
+    }
+  }
+  return order;
+}
+
+std::string LowerCase(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+// Looks for pictures in folders, best first.
+class PictureFinder {
+ public:
+  explicit PictureFinder(const std::vector<std::string>& folders) : folders_(folders) {}
+
+  // Empty when there is none. InvalidArgument: the last part of the name fits several.
+  absl::StatusOr<std::string> Find(const ImportedView& view) {
+    const std::vector<std::string> spellings = SpellingsOf(view.view.name);
+    for (const std::string& folder : folders_) {
+      for (const std::string& name : spellings) {
+        std::string path = JoinPath(folder, name);
+        if (IsFile(path)) return path;
+      }
+    }
+    for (const bool any_case : {false, true}) {
+      std::vector<std::string> hits;
+      for (const std::string& name : spellings) AppendHits(name, any_case, &hits);
+      if (hits.size() == 1) return hits.front();
+      if (hits.size() > 1) {
+        return FieldError(view.named_at, "image", Quoted(view.view.name),
+                          absl::StrCat("one picture, not both ", hits[0], " and ", hits[1]));
+      }
+    }
+    return std::string();
+  }
+
+ private:
+  static std::vector<std::string> SpellingsOf(const std::string& name) {
+    const std::string ending = LowerCase(std::filesystem::path(name).extension().string());
+    std::vector<std::string> spellings = {name};
+    for (const char* known : {".png", ".jpg", ".jpeg", ".pgm", ".ppm"}) {
+      if (ending == known) return spellings;
+    }
+    for (const char* missing : {".png", ".jpg", ".jpeg", ".JPG"}) spellings.push_back(name + missing);
+    return spellings;
+  }
+
+  void AppendHits(const std::string& name, bool any_case, std::vector<std::string>* hits) {
+    const std::string base = std::filesystem::path(name).filename().string();
+    if (!listed_) List();
+    const auto [begin, end] = paths_.equal_range(LowerCase(base));
+    for (auto it = begin; it != end; ++it) {
+      if (any_case || std::filesystem::path(it->second).filename().string() == base) hits->push_back(it->second);
+    }
+  }
+
+  void List() {
+    listed_ = true;
+    for (const std::string& folder : folders_) {
+      for (const std::string& name : FilesEndingIn(folder, "")) {
+        paths_.emplace(LowerCase(name), JoinPath(folder, name));
+      }
+    }
+  }
+
+  const std::vector<std::string>& folders_;
+  bool listed_ = false;
+  std::multimap<std::string, std::string> paths_;  // by their last part in lower case
+};
+
+// Gives every view its picture. Those without are left with an empty image_path, and there is a warning, when enough
+// others remain; else an error.
+absl::Status FindPictures(const std::vector<size_t>& order, ImportedScene* imported) {
+  PictureFinder finder(imported->image_folders);
+  std::vector<const ImportedView*> missing;
+  for (const size_t i : order) {
+    ImportedView& view = imported->views[i];
+    MW_ASSIGN_OR_RETURN(view.view.image_path, finder.Find(view));
+    if (view.view.image_path.empty()) missing.push_back(&view);
+  }
+  if (missing.empty()) return absl::OkStatus();
+  const ImportedView& first = *missing.front();
+  if (missing.size() == order.size()) {
+    return absl::NotFoundError(absl::StrCat(first.named_at.ToString(), ": image ", Quoted(first.view.name),
+                                            " not found; looked in ", absl::StrJoin(imported->image_folders, ", "),
+                                            "; --images FOLDER says where the photographs are"));
+  }
+  constexpr size_t kFewest = 3;
+  const size_t left = order.size() - missing.size();
+  if (left < kFewest || 2 * left < order.size()) {
+    return absl::NotFoundError(absl::StrCat(JoinPath(imported->image_folders.front(), first.view.name),
+                                            ": no such image; it is named at ", first.named_at.ToString(), "; ",
+                                            missing.size(), " of ", order.size(), " are missing"));
+  }
+  std::vector<std::string> names;
+  for (size_t i = 0; i < std::min<size_t>(missing.size(), 3); ++i) names.push_back(Quoted(missing[i]->view.name));
+  imported->warnings.push_back(absl::StrCat(missing.size(), " of ", order.size(),
+                                            " cameras are left out because their photographs are missing: ",
+                                            absl::StrJoin(names, ", "), missing.size() > 3 ? " ..." : ""));
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -135,31 +238,38 @@ absl::StatusOr<Eigen::Matrix3d> RotationFromQuaternion(double w, double x, doubl
   return quaternion.normalized().toRotationMatrix();
 }
 
-absl::StatusOr<Scene> AssembleScene(const std::string& format, const std::string& file, std::vector<ImportedView> views,
-                                    std::vector<SparsePoint> points, const std::vector<std::string>& image_folders) {
-  if (views.empty()) return absl::InvalidArgumentError(absl::StrCat(file, ": no cameras; expected at least one"));
-  for (const ImportedView& imported : views) MW_RETURN_IF_ERROR(CheckImageName(imported.view.name, imported.named_at));
+std::string PortableImageName(const std::string& path) {
+  std::string name = path;
+  std::replace(name.begin(), name.end(), '\\', '/');
+  const bool has_drive = name.size() > 1 && name[1] == ':';
+  const std::filesystem::path parts = std::filesystem::path(name).lexically_normal();
+  const bool climbs = std::find(parts.begin(), parts.end(), "..") != parts.end();
+  return has_drive || parts.is_absolute() || climbs ? parts.filename().string() : parts.string();
+}
 
-  std::vector<size_t> order(views.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return views[a].view.name < views[b].view.name; });
-  for (size_t i = 1; i < order.size(); ++i) {
-    const ImportedView& a = views[std::min(order[i - 1], order[i])];
-    const ImportedView& b = views[std::max(order[i - 1], order[i])];
-    if (a.view.name == b.view.name) {
-      return FieldError(b.named_at, "image name", Quoted(b.view.name),
-                        absl::StrCat("a name not used before (", a.named_at.ToString(), ")"));
-    }
+absl::StatusOr<Scene> AssembleScene(ImportedScene imported, const ImportOptions& options) {
+  std::vector<ImportedView>& views = imported.views;
+  if (views.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(imported.file, ": no cameras; expected at least one"));
   }
+  for (const ImportedView& view : views) MW_RETURN_IF_ERROR(CheckImageName(view.view.name, view.named_at));
+  if (!options.images_folder.empty()) {
+    if (!IsFolder(options.images_folder)) {
+      return absl::NotFoundError(absl::StrCat(options.images_folder, ": no such folder; expected the photographs"));
+    }
+    imported.image_folders = {options.images_folder};
+  }
+  MW_ASSIGN_OR_RETURN(const std::vector<size_t> order, OrderOfNames(views));
+  MW_RETURN_IF_ERROR(FindPictures(order, &imported));
 
-  Scene scene{.format = format, .views = {}, .points = std::move(points)};
-  MW_ASSIGN_OR_RETURN(const std::string folder, FindImageFolder(views[order.front()], image_folders));
-  std::vector<CameraIndex> new_index(views.size());
+  Scene scene{.format = std::move(imported.format), .views = {}, .points = std::move(imported.points)};
+  scene.warnings = std::move(imported.warnings);
+  std::vector<CameraIndex> new_index(views.size(), kDropped);
   for (const size_t old_index : order) {
-    ImportedView& imported = views[old_index];
-    MW_RETURN_IF_ERROR(AttachImage(folder, &imported));
+    if (views[old_index].view.image_path.empty()) continue;
+    MW_RETURN_IF_ERROR(CheckImageSize(&views[old_index]));
     new_index[old_index] = static_cast<CameraIndex>(scene.views.size());
-    scene.views.push_back(std::move(imported.view));
+    scene.views.push_back(std::move(views[old_index].view));
   }
   OrderPoints(new_index, &scene.points);
   return scene;

@@ -8,6 +8,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "common/scene/formats/import_options.h"
 #include "common/scene/formats/text_fields.h"
 #include "common/scene/scene.h"
 
@@ -27,11 +28,24 @@ struct ImportedView {
   Place named_at;
 };
 
-// Sorts views and points, finds the pictures and checks them by their headers. `points[i].seen_by` refer to the order
-// of `views`, unsorted and with repetitions if need be. Pictures are in the first of `image_folders` that holds the
-// first view's. `file` is the one that lists the views.
-absl::StatusOr<Scene> AssembleScene(const std::string& format, const std::string& file, std::vector<ImportedView> views,
-                                    std::vector<SparsePoint> points, const std::vector<std::string>& image_folders);
+// What an importer has read.
+struct ImportedScene {
+  std::string format;  // its name
+  std::string file;    // the one that lists the views
+  std::vector<ImportedView> views;
+  std::vector<SparsePoint> points;         // seen_by: indices into views, unsorted and with repetitions if need be
+  std::vector<std::string> image_folders;  // where pictures may be, best first
+  std::vector<std::string> warnings = {};
+};
+
+// Finds the pictures, checks them by their headers, sorts views and points. A picture is sought by its name in every
+// folder, then by the last part of its name, then without regard to case; a name without an ending gets one. Cameras
+// whose picture is missing are dropped as ImportScene says.
+absl::StatusOr<Scene> AssembleScene(ImportedScene imported, const ImportOptions& options);
+
+// The name of an image as other programs write paths: backslashes separate, and what is absolute or climbs out of the
+// folder is cut to its last part.
+std::string PortableImageName(const std::string& path);
 
 bool IsFile(const std::string& path);
 bool IsFolder(const std::string& path);

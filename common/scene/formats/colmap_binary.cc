@@ -93,7 +93,7 @@ absl::Status ReadCamera(BinaryFields* fields, ColmapSceneBuilder* builder) {
   const ColmapModelType* type = FindColmapModelType(model);
   if (type == nullptr) {
     return FieldError(fields->place(), "camera model", absl::StrCat("number ", model),
-                      "0 to 10: " + KnownColmapModelTypes());
+                      "one of those known: " + KnownColmapModelTypes());
   }
   MW_ASSIGN_OR_RETURN(const auto width, fields->Read<int64_t>("width"));
   MW_ASSIGN_OR_RETURN(const auto height, fields->Read<int64_t>("height"));
@@ -158,7 +158,9 @@ absl::Status ReadRecords(const std::string& file, const char* count_field, uint6
 
 }  // namespace
 
-absl::StatusOr<Scene> ImportColmapBinary(const std::string& model_folder) {
+absl::StatusOr<Scene> ImportColmapBinary(const std::string& folder, const ImportOptions& options) {
+  std::vector<std::string> warnings;
+  MW_ASSIGN_OR_RETURN(const std::string model_folder, ChooseColmapModel(folder, "bin", options, &warnings));
   ColmapSceneBuilder builder;
   MW_RETURN_IF_ERROR(ReadRecords(JoinPath(model_folder, "cameras.bin"), "number of cameras", kCameraBytes,
                                  [&](BinaryFields* fields) { return ReadCamera(fields, &builder); }));
@@ -168,7 +170,11 @@ absl::StatusOr<Scene> ImportColmapBinary(const std::string& model_folder) {
   std::vector<std::pair<uint32_t, uint32_t>> track;
   MW_RETURN_IF_ERROR(ReadRecords(JoinPath(model_folder, "points3D.bin"), "number of points", kPointBytes,
                                  [&](BinaryFields* fields) { return ReadPoint(fields, &track, &builder); }));
-  return builder.Finish("colmap-binary", model_folder, images_file);
+  return builder.Finish({.format = "colmap-binary",
+                         .file = images_file,
+                         .image_folders = ColmapImageFolders(model_folder),
+                         .warnings = std::move(warnings)},
+                        options);
 }
 
 }  // namespace meshwright

@@ -1,9 +1,14 @@
 #include "common/scene/formats/colmap_model.h"
 
+#include <algorithm>
+#include <cstring>
 #include <filesystem>
 
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
+#include "common/base/files.h"
 #include "common/base/status_macros.h"
 
 namespace meshwright {
@@ -21,10 +26,59 @@ constexpr ColmapModelType kTypes[] = {
     {8, "SIMPLE_RADIAL_FISHEYE", Lens::Model::kRadialFisheye, 4, true},
     {9, "RADIAL_FISHEYE", Lens::Model::kRadialFisheye, 5, true},
     {10, "THIN_PRISM_FISHEYE", Lens::Model::kThinPrismFisheye, 12, false},
+    // The angle itself: OPENCV_FISHEYE with all coefficients 0.
+    {14, "SIMPLE_FISHEYE", Lens::Model::kOpenCvFisheye, 3, true},
+    {15, "FISHEYE", Lens::Model::kOpenCvFisheye, 4, false},
 };
 
-// Up from the model's folder there may be sparse/0/ between it and the scene's.
-constexpr int kFoldersUp = 2;
+bool HasModel(const std::string& folder, const std::string& extension) {
+  return IsFile(JoinPath(folder, "cameras." + extension)) && IsFile(JoinPath(folder, "images." + extension));
+}
+
+std::string NumberedFolder(const std::string& folder, int number) { return JoinPath(folder, absl::StrCat(number)); }
+
+// Below a hundred million, which is more than anybody has.
+bool IsNumber(const std::string& name) {
+  constexpr size_t kMostDigits = 8;
+  return !name.empty() && name.size() <= kMostDigits && name.find_first_not_of("0123456789") == std::string::npos;
+}
+
+// The last part of the folder's full path, also for "." and "x/".
+std::string NameOf(const std::string& folder) {
+  std::error_code ignored;
+  const std::filesystem::path path = std::filesystem::absolute(folder, ignored).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
+// Sorted.
+std::vector<int> NumberedModels(const std::string& folder, const std::string& extension) {
+  std::vector<int> numbers;
+  std::error_code error;
+  std::filesystem::directory_iterator it(folder, error);
+  for (; !error && it != std::filesystem::directory_iterator(); it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    int number = 0;
+    if (!IsNumber(name) || !absl::SimpleAtoi(name, &number) || absl::StrCat(number) != name) continue;
+    if (HasModel(it->path().string(), extension)) numbers.push_back(number);
+  }
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+absl::StatusOr<int64_t> CountImages(const std::string& folder, const std::string& extension) {
+  if (extension == "bin") {
+    MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(JoinPath(folder, "images.bin")));
+    int64_t count = 0;
+    if (bytes.size() >= sizeof(count)) std::memcpy(&count, bytes.data(), sizeof(count));
+    return count;
+  }
+  MW_ASSIGN_OR_RETURN(const std::string text, ReadTextFile(JoinPath(folder, "images.txt")));
+  TextLines lines(text);
+  std::string_view line;
+  int64_t count = 0;
+  for (; lines.NextContent(&line); ++count) lines.Next(&line);  // every image has two lines
+  return count;
+}
 
 }  // namespace
 
@@ -113,30 +167,63 @@ absl::Status ColmapSceneBuilder::AddPoint(const Place& place, const Eigen::Vecto
   return absl::OkStatus();
 }
 
-absl::StatusOr<Scene> ColmapSceneBuilder::Finish(const std::string& format, const std::string& model_folder,
-                                                 const std::string& images_file) {
-  std::vector<std::string> folders;
-  std::string folder = model_folder;
-  for (int i = 0; i <= kFoldersUp; ++i) {
-    folders.push_back(JoinPath(folder, "images"));
-    folders.push_back(JoinPath(folder, ""));
-    folder = JoinPath(folder, "..");
-  }
-  return AssembleScene(format, images_file, std::move(views_), std::move(points_), folders);
+absl::StatusOr<Scene> ColmapSceneBuilder::Finish(ImportedScene scene, const ImportOptions& options) {
+  scene.views = std::move(views_);
+  scene.points = std::move(points_);
+  return AssembleScene(std::move(scene), options);
 }
 
-std::string FindColmapModelFolder(const std::string& folder, const std::string& extension) {
-  for (const char* below : {"", "model", "sparse", "sparse/0"}) {
+std::string FindColmapModels(const std::string& folder, const std::string& extension) {
+  for (const char* below : {"", "model", "sparse", "colmap/sparse"}) {
     std::string candidate = JoinPath(folder, below);
-    if (IsFile(JoinPath(candidate, "cameras." + extension)) && IsFile(JoinPath(candidate, "images." + extension))) {
-      return candidate;
-    }
+    if (HasModel(candidate, extension) || !NumberedModels(candidate, extension).empty()) return candidate;
   }
   return "";
 }
 
 std::string ColmapModelFiles(const std::string& extension) {
-  return absl::StrCat("cameras.", extension, " and images.", extension, " here or in model/, sparse/ or sparse/0/");
+  return absl::StrCat("cameras.", extension, " and images.", extension, " here or in model/, sparse/ or sparse/N/");
+}
+
+absl::StatusOr<std::string> ChooseColmapModel(const std::string& folder, const std::string& extension,
+                                              const ImportOptions& options, std::vector<std::string>* warnings) {
+  const std::vector<int> numbers = HasModel(folder, extension) ? std::vector<int>() : NumberedModels(folder, extension);
+  if (options.model.has_value() && std::find(numbers.begin(), numbers.end(), *options.model) == numbers.end()) {
+    return absl::NotFoundError(absl::StrCat(
+        folder, ": model is ", *options.model, "; expected ",
+        numbers.empty() ? "none, as there is one model only" : absl::StrCat("one of ", absl::StrJoin(numbers, ", "))));
+  }
+  if (numbers.empty()) return folder;
+  std::vector<int64_t> images;
+  for (const int number : numbers) {
+    MW_ASSIGN_OR_RETURN(const int64_t count, CountImages(NumberedFolder(folder, number), extension));
+    images.push_back(count);
+  }
+  size_t chosen = static_cast<size_t>(std::max_element(images.begin(), images.end()) - images.begin());
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i] == options.model) chosen = i;
+  }
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    if (i == chosen) continue;
+    warnings->push_back(absl::StrCat("cameras of ", NumberedFolder(folder, numbers[i]), " (", images[i],
+                                     " photographs) are another reconstruction and are not used; --model ", numbers[i],
+                                     " takes them"));
+  }
+  return NumberedFolder(folder, numbers[chosen]);
+}
+
+std::vector<std::string> ColmapImageFolders(const std::string& model_folder) {
+  std::vector<std::string> folders;
+  std::string folder = JoinPath(model_folder, "");
+  for (std::string name = NameOf(folder);; name = NameOf(folder)) {
+    folders.push_back(JoinPath(folder, "images"));
+    folders.push_back(folder);
+    const std::string above = JoinPath(folder, "../");
+    const bool holds_models = name == "sparse" || name == "colmap" || name == "model";
+    const bool is_numbered = IsNumber(name) && NameOf(above) == "sparse";
+    if (!holds_models && !is_numbered) return folders;
+    folder = above;
+  }
 }
 
 }  // namespace meshwright

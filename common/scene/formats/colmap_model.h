@@ -43,9 +43,8 @@ class ColmapSceneBuilder {
   // `track`: pairs of image id and index into the image's list.
   absl::Status AddPoint(const Place& place, const Eigen::Vector3d& x_in_world, const std::array<uint8_t, 3>& rgb,
                         const std::vector<std::pair<uint32_t, uint32_t>>& track);
-  // `model_folder`: where the files are; pictures are in images/ there or in a folder above, or beside the files.
-  absl::StatusOr<Scene> Finish(const std::string& format, const std::string& model_folder,
-                               const std::string& images_file);
+  // `scene`: all but views and points.
+  absl::StatusOr<Scene> Finish(ImportedScene scene, const ImportOptions& options);
 
  private:
   struct ImageRecord {
@@ -58,10 +57,18 @@ class ColmapSceneBuilder {
   std::vector<SparsePoint> points_;
 };
 
-// The folder of a COLMAP model: `folder` itself, or model/, sparse/ or sparse/0/ in it, whichever first has cameras and
-// images files with this extension ("txt", "bin"). Empty when there is none.
-std::string FindColmapModelFolder(const std::string& folder, const std::string& extension);
-// What FindColmapModelFolder looks for, for errors.
+// The folder of one COLMAP model or of several: `folder` itself, or model/, sparse/ or colmap/sparse/ in it, whichever
+// first has cameras and images files with this extension ("txt", "bin"), or folders 0/, 1/ ... that have. Empty when
+// there is none.
+std::string FindColmapModels(const std::string& folder, const std::string& extension);
+// What FindColmapModels looks for, for errors.
 std::string ColmapModelFiles(const std::string& extension);
+// The model in a folder that FindColmapModels gave: of several (0/, 1/ ..., reconstructions that have nothing to do
+// with each other) options.model, else the one with most images, the first of equals. `warnings` name the others.
+absl::StatusOr<std::string> ChooseColmapModel(const std::string& folder, const std::string& extension,
+                                              const ImportOptions& options, std::vector<std::string>* warnings);
+// Where a model's pictures may be: in images/ beside its files or beside them; and where the model's folder has one of
+// the names above, the same in the folder that holds it. Never further up: pictures there are another scene's.
+std::vector<std::string> ColmapImageFolders(const std::string& model_folder);
 
 }  // namespace meshwright

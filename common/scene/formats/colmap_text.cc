@@ -4,7 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/files.h"
 #include "common/base/status_macros.h"
 #include "common/scene/formats/colmap_model.h"
 #include "common/scene/formats/text_fields.h"
@@ -95,19 +94,21 @@ absl::Status ReadPoint(TextFields fields, std::vector<std::pair<uint32_t, uint32
 
 }  // namespace
 
-absl::StatusOr<Scene> ImportColmapText(const std::string& model_folder) {
+absl::StatusOr<Scene> ImportColmapText(const std::string& folder, const ImportOptions& options) {
+  std::vector<std::string> warnings;
+  MW_ASSIGN_OR_RETURN(const std::string model_folder, ChooseColmapModel(folder, "txt", options, &warnings));
   ColmapSceneBuilder builder;
   std::string_view line;
 
   const std::string cameras_file = JoinPath(model_folder, "cameras.txt");
-  MW_ASSIGN_OR_RETURN(const std::string cameras, ReadFile(cameras_file));
+  MW_ASSIGN_OR_RETURN(const std::string cameras, ReadTextFile(cameras_file));
   TextLines camera_lines(cameras);
   while (camera_lines.NextContent(&line)) {
     MW_RETURN_IF_ERROR(ReadCamera(TextFields(line, {cameras_file, "line", camera_lines.number()}), &builder));
   }
 
   const std::string images_file = JoinPath(model_folder, "images.txt");
-  MW_ASSIGN_OR_RETURN(const std::string images, ReadFile(images_file));
+  MW_ASSIGN_OR_RETURN(const std::string images, ReadTextFile(images_file));
   TextLines image_lines(images);
   while (image_lines.NextContent(&line)) {
     const Place place{images_file, "line", image_lines.number()};
@@ -118,13 +119,17 @@ absl::StatusOr<Scene> ImportColmapText(const std::string& model_folder) {
   }
 
   const std::string points_file = JoinPath(model_folder, "points3D.txt");
-  MW_ASSIGN_OR_RETURN(const std::string points, ReadFile(points_file));
+  MW_ASSIGN_OR_RETURN(const std::string points, ReadTextFile(points_file));
   TextLines point_lines(points);
   std::vector<std::pair<uint32_t, uint32_t>> track;
   while (point_lines.NextContent(&line)) {
     MW_RETURN_IF_ERROR(ReadPoint(TextFields(line, {points_file, "line", point_lines.number()}), &track, &builder));
   }
-  return builder.Finish("colmap-text", model_folder, images_file);
+  return builder.Finish({.format = "colmap-text",
+                         .file = images_file,
+                         .image_folders = ColmapImageFolders(model_folder),
+                         .warnings = std::move(warnings)},
+                        options);
 }
 
 }  // namespace meshwright

@@ -16,7 +16,7 @@ class FaultInjection : public testing::TestWithParam<SceneFiles (*)()> {
     const SceneFiles files = GetParam()();
     folder_ = FreshFolder("fault");
     WriteScene(folder_, files);
-    ASSERT_TRUE(ImportScene(folder_, std::nullopt).ok());
+    ASSERT_TRUE(ImportScene(folder_).ok());
     for (const auto& [file, bytes] : files) {
       if (file.ends_with(".png")) continue;
       body(file, bytes);
@@ -27,7 +27,7 @@ class FaultInjection : public testing::TestWithParam<SceneFiles (*)()> {
   // Returns whether the scene could be read.
   bool ImportDamaged(const std::string& file, const std::string& bytes) {
     WriteScene(folder_, {{file, bytes}});
-    const absl::StatusOr<Scene> scene = ImportScene(folder_, std::nullopt);
+    const absl::StatusOr<Scene> scene = ImportScene(folder_);
     if (scene.ok()) {
       for (const SceneView& view : scene->views) EXPECT_TRUE(view.cam_from_world.translation.allFinite());
       EXPECT_TRUE(LoadView(scene->views.front(), 8).ok());

@@ -11,14 +11,14 @@ namespace meshwright {
 
 const std::vector<SceneFormat>& SceneFormats() {
   static const std::vector<SceneFormat> formats = {
-      {"colmap-binary", ColmapModelFiles("bin"),
-       [](const std::string& path) { return FindColmapModelFolder(path, "bin"); }, ImportColmapBinary},
-      {"colmap-text", ColmapModelFiles("txt"),
-       [](const std::string& path) { return FindColmapModelFolder(path, "txt"); }, ImportColmapText},
+      {"colmap-binary", ColmapModelFiles("bin"), [](const std::string& path) { return FindColmapModels(path, "bin"); },
+       ImportColmapBinary},
+      {"colmap-text", ColmapModelFiles("txt"), [](const std::string& path) { return FindColmapModels(path, "txt"); },
+       ImportColmapText},
       {"middlebury", "*_par.txt",
        [](const std::string& path) { return FilesEndingIn(path, "_par.txt").empty() ? std::string() : path; },
        ImportMiddlebury},
-      {"strecha", "*.camera here or in cameras/",
+      {"strecha", "*.camera here, in cameras/ or in gt_dense_cameras/",
        [](const std::string& path) { return FindStrechaCameras(path).empty() ? std::string() : path; }, ImportStrecha},
   };
   return formats;

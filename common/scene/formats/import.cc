@@ -7,52 +7,65 @@
 #include <absl/strings/str_join.h>
 
 #include "common/scene/formats/assemble.h"
+#include "common/scene/formats/colmap_binary.h"
+#include "common/scene/formats/colmap_text.h"
 #include "common/scene/formats/formats.h"
 
 namespace meshwright {
 namespace {
 
-absl::StatusOr<Scene> ImportForced(const std::string& path, const std::string& name) {
+absl::StatusOr<Scene> ImportForced(const std::string& path, const ImportOptions& options) {
   std::vector<std::string> names;
   for (const SceneFormat& format : SceneFormats()) {
-    if (name == format.name) {
-      const std::string folder = format.find(path);
-      if (!folder.empty()) return format.import(folder);
-      return absl::NotFoundError(absl::StrCat(path, ": no ", name, " scene; expected ", format.looks_for));
+    if (*options.format == format.name) {
+      const std::string found = format.find(path);
+      if (!found.empty()) return format.import(found, options);
+      return absl::NotFoundError(absl::StrCat(path, ": no ", format.name, " scene; expected ", format.looks_for));
     }
     names.emplace_back(format.name);
   }
   return absl::InvalidArgumentError(
-      absl::StrCat("format is ", Quoted(name), "; expected one of ", absl::StrJoin(names, ", ")));
+      absl::StrCat("format is ", Quoted(*options.format), "; expected one of ", absl::StrJoin(names, ", ")));
+}
+
+// A COLMAP model that is there in both forms is one scene, not two.
+bool IsSameModelInText(const SceneFormat& taken, const std::string& taken_at, const SceneFormat& other,
+                       const std::string& other_at) {
+  return taken.import == ImportColmapBinary && other.import == ImportColmapText && taken_at == other_at;
 }
 
 }  // namespace
 
-absl::StatusOr<Scene> ImportScene(const std::string& path, const std::optional<std::string>& format) {
+absl::StatusOr<Scene> ImportScene(const std::string& path, const ImportOptions& options) {
   if (!IsFolder(path)) {
     if (IsFile(path)) return absl::InvalidArgumentError(absl::StrCat(path, ": a file; expected a scene's folder"));
     return absl::NotFoundError(absl::StrCat(path, ": no such folder; expected a scene's folder"));
   }
-  if (format.has_value()) return ImportForced(path, *format);
+  if (options.format.has_value()) return ImportForced(path, options);
 
-  std::vector<SceneFormat> found;
+  const SceneFormat* taken = nullptr;
+  std::string taken_at;
+  std::vector<std::string> warnings;
   std::vector<std::string> looked_for;
   for (const SceneFormat& candidate : SceneFormats()) {
     looked_for.push_back(absl::StrCat(candidate.looks_for, " (", candidate.name, ")"));
-    if (candidate.find(path).empty()) continue;
-    const bool text_beside_binary = !found.empty() && found.back().name == std::string("colmap-binary") &&
-                                    candidate.name == std::string("colmap-text");
-    if (!text_beside_binary) found.push_back(candidate);
+    const std::string found = candidate.find(path);
+    if (found.empty()) continue;
+    if (taken == nullptr) {
+      taken = &candidate;
+      taken_at = found;
+    } else if (!IsSameModelInText(*taken, taken_at, candidate, found)) {
+      warnings.push_back(absl::StrCat("read as ", taken->name, "; the folder also looks like ", candidate.name, " (",
+                                      found, "), which --format ", candidate.name, " would read"));
+    }
   }
-  if (found.empty()) {
+  if (taken == nullptr) {
     return absl::InvalidArgumentError(
         absl::StrCat(path, ": no scene of a known format; expected one of: ", absl::StrJoin(looked_for, "; ")));
   }
-  if (found.size() > 1) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": looks like ", found[0].name, " and like ", found[1].name,
-                                                   "; expected one, or a format that is named"));
-  }
-  return found.front().import(found.front().find(path));
+  absl::StatusOr<Scene> scene = taken->import(taken_at, options);
+  if (scene.ok()) scene->warnings.insert(scene->warnings.end(), warnings.begin(), warnings.end());
+  return scene;
 }
 
 }  // namespace meshwright

@@ -15,7 +15,9 @@ namespace {
 
 using testing::AllOf;
 using testing::ElementsAre;
+using testing::EndsWith;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 std::string ReplaceOnce(std::string text, const std::string& from, const std::string& to) {
   const size_t position = text.find(from);
@@ -68,14 +70,14 @@ std::string WriteFresh(const std::string& name, const SceneFiles& files) {
 
 Scene ImportFresh(const std::string& name, const SceneFiles& files) {
   const std::string folder = WriteFresh(name, files);
-  const absl::StatusOr<Scene> scene = ImportScene(folder, std::nullopt);
+  const absl::StatusOr<Scene> scene = ImportScene(folder);
   EXPECT_TRUE(scene.ok()) << scene.status();
   return scene.ok() ? *scene : Scene();
 }
 
 absl::Status ImportError(const SceneFiles& files) {
   const std::string folder = WriteFresh("error", files);
-  absl::Status status = ImportScene(folder, std::nullopt).status();
+  absl::Status status = ImportScene(folder).status();
   EXPECT_EQ(status.message().find('\n'), absl::string_view::npos) << status;
   return status;
 }
@@ -137,8 +139,8 @@ TEST(ImportScene, ColmapLayouts) {
 
 TEST(ImportScene, TheModelsOwnFolderWillDo) {
   const std::string folder = WriteFresh("inner", SmallColmapBinary());
-  EXPECT_TRUE(ImportScene(folder + "/sparse/0", std::nullopt).ok());
-  EXPECT_TRUE(ImportScene(folder + "/sparse/0/", "colmap-binary").ok());
+  EXPECT_TRUE(ImportScene(folder + "/sparse/0").ok());
+  EXPECT_TRUE(ImportScene(folder + "/sparse/0/", {.format = "colmap-binary"}).ok());
 }
 
 TEST(ImportScene, BinaryWinsOverText) {
@@ -147,8 +149,8 @@ TEST(ImportScene, BinaryWinsOverText) {
     files[name.find(".bin") == std::string::npos ? name : std::filesystem::path(name).filename().string()] = bytes;
   }
   const std::string folder = WriteFresh("both", files);
-  EXPECT_EQ(ImportScene(folder, std::nullopt).value().format, "colmap-binary");
-  EXPECT_EQ(ImportScene(folder, "colmap-text").value().format, "colmap-text");
+  EXPECT_EQ(ImportScene(folder).value().format, "colmap-binary");
+  EXPECT_EQ(ImportScene(folder, {.format = "colmap-text"}).value().format, "colmap-text");
 }
 
 TEST(ImportScene, ImagesInSubfoldersAndNamesWithSpaces) {
@@ -326,7 +328,8 @@ TEST(ImportScene, CountsThatLieAllocateNothing) {
   EXPECT_THAT(InvalidMessage(files), HasSubstr("points3D.bin, record 1: track length is 18446744073709551615"));
   files = SmallColmapBinary();
   files["sparse/0/cameras.bin"][12] = 11;
-  EXPECT_THAT(InvalidMessage(files), HasSubstr("cameras.bin, record 1: camera model is number 11; expected 0 to 10"));
+  EXPECT_THAT(InvalidMessage(files),
+              HasSubstr("cameras.bin, record 1: camera model is number 11; expected one of those known"));
   files = SmallColmapBinary();
   files["sparse/0/images.bin"] += 'x';
   EXPECT_THAT(InvalidMessage(files), HasSubstr("images.bin, record 3: 1 bytes follow the last record"));
@@ -334,33 +337,145 @@ TEST(ImportScene, CountsThatLieAllocateNothing) {
 
 TEST(ImportScene, SaysWhatItLookedFor) {
   const std::string folder = FreshFolder("nothing");
-  absl::Status status = ImportScene(folder, std::nullopt).status();
+  absl::Status status = ImportScene(folder).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(status.message()),
               AllOf(HasSubstr("cameras.bin"), HasSubstr("cameras.txt"), HasSubstr("*_par.txt"), HasSubstr("*.camera")));
-  status = ImportScene(folder, "middlebury").status();
+  status = ImportScene(folder, {.format = "middlebury"}).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(std::string(status.message()), HasSubstr("no middlebury scene; expected *_par.txt"));
-  status = ImportScene(folder, "bundler").status();
+  status = ImportScene(folder, {.format = "bundler"}).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(status.message()), HasSubstr("format is \"bundler\"; expected one of colmap-binary"));
-  EXPECT_EQ(ImportScene(folder + "/none", std::nullopt).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(ImportScene(folder + "/none").status().code(), absl::StatusCode::kNotFound);
   WriteScene(folder, {{"file", "x"}});
-  EXPECT_EQ(ImportScene(folder + "/file", std::nullopt).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ImportScene(folder + "/file").status().code(), absl::StatusCode::kInvalidArgument);
 }
 
-TEST(ImportScene, TwoFormatsInOneFolderNeedAWord) {
+TEST(ImportScene, OfTwoFormatsTheFirstIsTakenAndTheOtherNamed) {
   SceneFiles files = SmallColmapText();
   files.merge(SmallMiddlebury());
-  EXPECT_THAT(InvalidMessage(files), HasSubstr("looks like colmap-text and like middlebury"));
-  EXPECT_TRUE(ImportScene(WriteFresh("two", files), "middlebury").ok());
+  const Scene scene = ImportFresh("two", files);
+  EXPECT_EQ(scene.format, "colmap-text");
+  EXPECT_THAT(scene.warnings, ElementsAre(HasSubstr("also looks like middlebury")));
+  const absl::StatusOr<Scene> forced = ImportScene(WriteFresh("two", files), {.format = "middlebury"});
+  ASSERT_TRUE(forced.ok()) << forced.status();
+  EXPECT_EQ(forced->format, "middlebury");
+  EXPECT_THAT(forced->warnings, IsEmpty());
+}
+
+TEST(ImportScene, AByteOrderMarkIsSkipped) {
+  for (SceneFiles files : {SmallColmapText(), SmallMiddlebury(), SmallStrecha()}) {
+    for (auto& [name, bytes] : files) {
+      if (!name.ends_with(".png")) bytes.insert(0, "\xEF\xBB\xBF");
+    }
+    // Also where no comment stands before the first record.
+    if (files.contains("cameras.txt")) files["cameras.txt"] = ReplaceOnce(files["cameras.txt"], "# Camera list\n", "");
+    ExpectSmallPoses(ImportFresh("mark", files));
+  }
+}
+
+// sparse/0 with two of the photographs, sparse/1 with all three.
+SceneFiles TwoColmapModels() {
+  SceneFiles files;
+  for (const auto& [name, bytes] : SmallColmapText()) {
+    if (name.ends_with(".png")) {
+      files[name] = bytes;
+      continue;
+    }
+    for (const char* model : {"sparse/0/", "sparse/1/"}) files[model + name] = bytes;
+  }
+  files["sparse/0/images.txt"] = ReplaceOnce(files["sparse/0/images.txt"], "6 0 0 1 0 -1 0.5 2e0 3 c.png\n3 3 4\n", "");
+  files["sparse/0/points3D.txt"] = "";
+  return files;
+}
+
+TEST(ImportScene, OfSeveralColmapModelsTheLargestIsTakenAndTheOthersNamed) {
+  const std::string folder = WriteFresh("models", TwoColmapModels());
+  const absl::StatusOr<Scene> scene = ImportScene(folder);
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  ExpectSmallPoses(*scene);
+  EXPECT_THAT(scene->warnings, ElementsAre(AllOf(HasSubstr("sparse/0 (2 photographs)"), HasSubstr("--model 0"))));
+  const absl::StatusOr<Scene> other = ImportScene(folder, {.model = 0});
+  ASSERT_TRUE(other.ok()) << other.status();
+  EXPECT_EQ(other->views.size(), 2);
+  EXPECT_THAT(other->warnings, ElementsAre(HasSubstr("sparse/1 (3 photographs)")));
+  const absl::Status none = ImportScene(folder, {.model = 7}).status();
+  EXPECT_EQ(none.code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(none.message()), HasSubstr("model is 7; expected one of 0, 1"));
+}
+
+TEST(ImportScene, FilesOfRigsAndFramesChangeNothing) {
+  SceneFiles files = SmallColmapBinary();
+  for (const char* name : {"rigs.bin", "frames.bin"}) files[std::string("sparse/0/") + name] = "not read";
+  const Scene scene = ImportFresh("rigs", files);
+  ExpectSmallPoses(scene);
+  ExpectSmallColmapRest(scene);
+}
+
+TEST(ImportScene, PhotographsOfTheFolderAboveAreAnotherScenes) {
+  SceneFiles files;
+  for (const auto& [name, bytes] : SmallColmapText()) {
+    if (!name.ends_with(".png")) {
+      files["A/" + name] = bytes;
+      continue;
+    }
+    files[name] = bytes;  // images/ of the other scene
+    files["A/photos/" + std::filesystem::path(name).filename().string()] = bytes;
+  }
+  const std::string folder = WriteFresh("parent", files);
+  const absl::Status status = ImportScene(folder + "/A").status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(status.message()), AllOf(HasSubstr("image \"a.png\" not found"), HasSubstr("--images")));
+  const absl::StatusOr<Scene> told = ImportScene(folder + "/A", {.images_folder = folder + "/A/photos"});
+  ASSERT_TRUE(told.ok()) << told.status();
+  EXPECT_EQ(told->views[0].image_path, JoinPath(folder, "A/photos/a.png"));
+  EXPECT_EQ(ImportScene(folder + "/A", {.images_folder = folder + "/none"}).status().code(),
+            absl::StatusCode::kNotFound);
+}
+
+TEST(ImportScene, StrechaAsPublished) {
+  SceneFiles files;
+  for (const auto& [name, bytes] : SmallStrecha()) {
+    const std::string base = std::filesystem::path(name).filename().string();
+    files[(base.ends_with(".camera") ? "gt_dense_cameras/" : "images/") + base] = bytes;
+  }
+  ExpectSmallPoses(ImportFresh("published", files));
+}
+
+TEST(ImportScene, AFewMissingPhotographsCostTheirCamerasOnly) {
+  SceneFiles files = SmallColmapText();
+  files["images.txt"] += "20 1 0 0 0 1 0 0 3 d.png\n\n";
+  files["points3D.txt"] += "30 0 0 5 1 2 3 0 20 0 11 0\n";
+  const Scene scene = ImportFresh("missing", files);
+  ASSERT_EQ(scene.views.size(), 3);
+  EXPECT_THAT(scene.warnings, ElementsAre(AllOf(HasSubstr("1 of 4 cameras"), HasSubstr("d.png"))));
+  for (const SparsePoint& point : scene.points) {
+    for (const CameraIndex camera : point.seen_by) EXPECT_LT(camera, 3);
+  }
+}
+
+TEST(ImportScene, PicturesAreFoundWhateverTheCaseOrFolderOfTheirNames) {
+  SceneFiles files = SmallColmapText();
+  files["images.txt"] = ReplaceOnce(files["images.txt"], "a.png", "elsewhere/A.PNG");
+  const Scene scene = ImportFresh("case", files);
+  EXPECT_THAT(scene.views[2].image_path, EndsWith("images/a.png"));
+  files["a.png"] = SmallPicture();
+  EXPECT_THAT(InvalidMessage(files), HasSubstr("expected one picture, not both"));
+}
+
+TEST(ImportScene, PathsOfOtherMachines) {
+  EXPECT_EQ(PortableImageName("C:\\photos\\a.png"), "a.png");
+  EXPECT_EQ(PortableImageName("/home/x/a.png"), "a.png");
+  EXPECT_EQ(PortableImageName("../images/a.png"), "a.png");
+  EXPECT_EQ(PortableImageName("./left\\a.png"), "left/a.png");
 }
 
 TEST(ExportColmapText, ReadsBackTheSame) {
   const std::string folder = WriteFresh("export", SmallColmapBinary());
-  const Scene scene = ImportScene(folder, std::nullopt).value();
+  const Scene scene = ImportScene(folder).value();
   ASSERT_TRUE(ExportColmapText(scene, folder + "/model").ok());
-  const absl::StatusOr<Scene> read = ImportScene(folder, "colmap-text");
+  const absl::StatusOr<Scene> read = ImportScene(folder, {.format = "colmap-text"});
   ASSERT_TRUE(read.ok()) << read.status();
   ExpectSmallPoses(*read);
   ExpectSmallColmapRest(*read);

@@ -6,7 +6,6 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
-#include "common/base/files.h"
 #include "common/base/status_macros.h"
 #include "common/scene/formats/calibration_matrix.h"
 
@@ -31,14 +30,14 @@ absl::StatusOr<ImportedView> ReadView(TextFields fields) {
 
 }  // namespace
 
-absl::StatusOr<Scene> ImportMiddlebury(const std::string& folder) {
+absl::StatusOr<Scene> ImportMiddlebury(const std::string& folder, const ImportOptions& options) {
   const std::vector<std::string> files = FilesEndingIn(folder, "_par.txt");
   if (files.size() != 1) {
     return absl::InvalidArgumentError(absl::StrCat(folder, ": ", files.size(), " files *_par.txt (",
                                                    absl::StrJoin(files, ", "), "); expected exactly one"));
   }
   const std::string file = JoinPath(folder, files.front());
-  MW_ASSIGN_OR_RETURN(const std::string text, ReadFile(file));
+  MW_ASSIGN_OR_RETURN(const std::string text, ReadTextFile(file));
   TextLines lines(text);
   std::string_view line;
   if (!lines.NextContent(&line)) {
@@ -57,7 +56,12 @@ absl::StatusOr<Scene> ImportMiddlebury(const std::string& folder) {
     return absl::InvalidArgumentError(
         absl::StrCat(file, ": ", views.size(), " images; expected ", count, " as its first line says"));
   }
-  return AssembleScene("middlebury", file, std::move(views), {}, {JoinPath(folder, "")});
+  return AssembleScene({.format = "middlebury",
+                        .file = file,
+                        .views = std::move(views),
+                        .points = {},
+                        .image_folders = {JoinPath(folder, "")}},
+                       options);
 }
 
 }  // namespace meshwright

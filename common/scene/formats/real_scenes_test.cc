@@ -27,7 +27,7 @@ class RealScenes : public testing::Test {
   }
 
   Scene Import(const std::string& name) {
-    const absl::StatusOr<Scene> scene = ImportScene(JoinPath(DataFolder(), name), std::nullopt);
+    const absl::StatusOr<Scene> scene = ImportScene(JoinPath(DataFolder(), name));
     EXPECT_TRUE(scene.ok()) << scene.status();
     return scene.ok() ? *scene : Scene();
   }

@@ -5,7 +5,6 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "common/base/files.h"
 #include "common/base/status_macros.h"
 #include "common/scene/formats/calibration_matrix.h"
 
@@ -15,7 +14,7 @@ namespace {
 constexpr char kSuffix[] = ".camera";
 
 absl::StatusOr<ImportedView> ReadCameraFile(const std::string& file, const std::string& image_name) {
-  MW_ASSIGN_OR_RETURN(const std::string text, ReadFile(file));
+  MW_ASSIGN_OR_RETURN(const std::string text, ReadTextFile(file));
   TextFields fields(text, {file, "line", 1});
   MW_ASSIGN_OR_RETURN(const Eigen::Matrix3d k, ReadMatrix(&fields, "K"));
   for (int i = 0; i < 3; ++i) {
@@ -47,24 +46,29 @@ absl::StatusOr<ImportedView> ReadCameraFile(const std::string& file, const std::
 }  // namespace
 
 std::string FindStrechaCameras(const std::string& folder) {
-  for (const char* below : {"cameras", ""}) {
+  for (const char* below : {"cameras", "gt_dense_cameras", ""}) {
     std::string candidate = JoinPath(folder, below);
     if (!FilesEndingIn(candidate, kSuffix).empty()) return candidate;
   }
   return "";
 }
 
-absl::StatusOr<Scene> ImportStrecha(const std::string& folder) {
+absl::StatusOr<Scene> ImportStrecha(const std::string& folder, const ImportOptions& options) {
   const std::string cameras = FindStrechaCameras(folder);
-  if (cameras.empty()) return absl::NotFoundError(absl::StrCat(folder, ": no *.camera files here or in cameras/"));
+  if (cameras.empty())
+    return absl::NotFoundError(absl::StrCat(folder, ": no *.camera files here, in cameras/ or in gt_dense_cameras/"));
   std::vector<ImportedView> views;
   for (const std::string& name : FilesEndingIn(cameras, kSuffix)) {
     const std::string image_name = name.substr(0, name.size() - (sizeof(kSuffix) - 1));
     MW_ASSIGN_OR_RETURN(ImportedView view, ReadCameraFile(JoinPath(cameras, name), image_name));
     views.push_back(std::move(view));
   }
-  return AssembleScene("strecha", cameras, std::move(views), {},
-                       {JoinPath(folder, "images"), JoinPath(folder, ""), cameras});
+  return AssembleScene({.format = "strecha",
+                        .file = cameras,
+                        .views = std::move(views),
+                        .points = {},
+                        .image_folders = {JoinPath(folder, "images"), JoinPath(folder, ""), cameras}},
+                       options);
 }
 
 }  // namespace meshwright

@@ -6,6 +6,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "common/base/files.h"
 #include "common/base/status_macros.h"
 
 namespace meshwright {
@@ -39,6 +40,13 @@ std::string Quoted(std::string_view value) {
     quoted += code >= 0x20 && code < 0x7F ? c : '?';
   }
   return quoted + (value.size() > kLongest ? "...\"" : "\"");
+}
+
+absl::StatusOr<std::string> ReadTextFile(const std::string& path) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  MW_ASSIGN_OR_RETURN(std::string text, ReadFile(path));
+  if (text.compare(0, kByteOrderMark.size(), kByteOrderMark) == 0) text.erase(0, kByteOrderMark.size());
+  return text;
 }
 
 bool TextLines::Next(std::string_view* line) {

@@ -24,6 +24,9 @@ absl::Status FieldError(const Place& place, const std::string& field, const std:
 // `value` as it can be shown in one line: quoted, cut, without control characters.
 std::string Quoted(std::string_view value);
 
+// ReadFile for text: a byte order mark (UTF-8), which editors leave, is skipped.
+absl::StatusOr<std::string> ReadTextFile(const std::string& path);
+
 // Lines of a text, without their ends (LF or CR LF).
 class TextLines {
  public:

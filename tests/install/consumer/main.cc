@@ -9,7 +9,7 @@
 
 int main(int argc, char** argv) {
   if (argc != 3) return 2;
-  const auto scene = meshwright::ImportScene(argv[1], std::nullopt);
+  const auto scene = meshwright::ImportScene(argv[1]);
   if (!scene.ok()) return std::cerr << scene.status() << "\n", 1;
   const auto done = meshwright::Reconstruct(*scene, {.output_path = argv[2], .options_json = R"({"lattice-step": 1})"});
   if (!done.ok()) return std::cerr << done.status() << "\n", 1;

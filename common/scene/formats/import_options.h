@@ -1,0 +1,15 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace meshwright {
+
+// What a user may say about a scene instead of leaving it to its content.
+struct ImportOptions {
+  std::optional<std::string> format;  // a name of SceneFormats()
+  std::optional<int> model;           // which of several reconstructions in the scene; without it the largest
+  std::string images_folder;          // where the photographs are; empty: the places that are usual for the format
+};
+
+}  // namespace meshwright
