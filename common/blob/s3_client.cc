@@ -115,7 +115,7 @@ S3Client::~S3Client() {
 
 void* S3Client::TakeHandle() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!idle_handles_.empty()) {
       void* const handle = idle_handles_.back();
       idle_handles_.pop_back();
@@ -128,7 +128,7 @@ void* S3Client::TakeHandle() {
 }
 
 void S3Client::ReturnHandle(void* handle) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   idle_handles_.push_back(handle);
 }
 
@@ -142,18 +142,17 @@ absl::StatusOr<S3Response> S3Client::Send(const S3Request& request) {
   const absl::Time deadline = absl::Now() + options_.retry_deadline;
   absl::Duration pause = kFirstPause;
   while (true) {
-    bool retry = false;
-    absl::StatusOr<S3Response> response = SendOnce(handle, request, &retry);
-    if (!retry || absl::Now() + pause >= deadline) {
+    Attempt attempt = SendOnce(handle, request);
+    if (!attempt.may_retry || absl::Now() + pause >= deadline) {
       ReturnHandle(handle);
-      return response;
+      return std::move(attempt.response);
     }
     absl::SleepFor(Jittered(pause));
     pause = std::min(2 * pause, kLongestPause);
   }
 }
 
-absl::StatusOr<S3Response> S3Client::SendOnce(void* handle, const S3Request& request, bool* retry) {
+S3Client::Attempt S3Client::SendOnce(void* handle, const S3Request& request) {
   curl_easy_reset(handle);  // keeps the connection
   std::string url = UrlOf(request.key);
   if (!request.query.empty()) absl::StrAppend(&url, "?", request.query);
@@ -194,16 +193,16 @@ absl::StatusOr<S3Response> S3Client::SendOnce(void* handle, const S3Request& req
   const CURLcode code = curl_easy_perform(handle);
   curl_slist_free_all(headers);
   if (code != CURLE_OK) {
-    *retry = !IsPermanent(code);
-    return absl::UnavailableError(absl::StrCat(request.method, " ", url, ": ", curl_easy_strerror(code)));
+    return {absl::UnavailableError(absl::StrCat(request.method, " ", url, ": ", curl_easy_strerror(code))),
+            !IsPermanent(code)};
   }
   long status = 0;
   curl_easy_getinfo(handle, CURLINFO_RESPONSE_CODE, &status);
   response.status = static_cast<int>(status);
-  if (status >= 200 && status < 300) return response;
-  *retry = (status >= 500 && status != 501 && status != 507) || status == 429 || status == 408 ||
-           XmlText(response.body, "Code") == "RequestTimeout";
-  return ErrorOf(request, response);
+  if (status >= 200 && status < 300) return {std::move(response), false};
+  const bool may_retry = (status >= 500 && status != 501 && status != 507) || status == 429 || status == 408 ||
+                         XmlText(response.body, "Code") == "RequestTimeout";
+  return {ErrorOf(request, response), may_retry};
 }
 
 absl::Status S3Client::ErrorOf(const S3Request& request, const S3Response& response) const {

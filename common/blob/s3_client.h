@@ -2,13 +2,14 @@
 
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 #include <absl/time/time.h>
+
+#include "common/base/mutex.h"
 
 namespace meshwright {
 
@@ -67,15 +68,18 @@ class S3Client {
   absl::StatusOr<S3Response> Send(const S3Request& request);
 
  private:
-  // One attempt; sets `retry` when another one may help.
-  absl::StatusOr<S3Response> SendOnce(void* handle, const S3Request& request, bool* retry);
+  struct Attempt {
+    absl::StatusOr<S3Response> response;
+    bool may_retry = false;  // another attempt may help
+  };
+  Attempt SendOnce(void* handle, const S3Request& request);
   absl::Status ErrorOf(const S3Request& request, const S3Response& response) const;
   void* TakeHandle();
   void ReturnHandle(void* handle);
 
   const S3Options options_;
-  std::mutex mutex_;
-  std::vector<void*> idle_handles_;  // CURL*
+  Mutex mutex_;
+  std::vector<void*> idle_handles_ ABSL_GUARDED_BY(mutex_);  // CURL*
 };
 
 // The text between <tag> and </tag>, "" when there is none.

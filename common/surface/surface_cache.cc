@@ -8,7 +8,7 @@ namespace meshwright {
 
 absl::StatusOr<std::shared_ptr<const SparseSurface>> SurfaceCache::Get(const std::string& digest) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (const auto found = entry_of_digest_.find(digest); found != entry_of_digest_.end()) {
       kept_.splice(kept_.begin(), kept_, found->second);
       return kept_.front().surface;
@@ -16,7 +16,7 @@ absl::StatusOr<std::shared_ptr<const SparseSurface>> SurfaceCache::Get(const std
   }
   MW_ASSIGN_OR_RETURN(SparseSurface loaded, loader_(digest));
   auto surface = std::make_shared<const SparseSurface>(std::move(loaded));
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (surface->bytes() > budget_bytes_ || entry_of_digest_.contains(digest)) return surface;
   kept_.push_front({digest, surface});
   entry_of_digest_[digest] = kept_.begin();

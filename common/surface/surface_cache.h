@@ -4,13 +4,13 @@
 #include <functional>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 
 #include <absl/container/flat_hash_map.h>
 #include <absl/status/statusor.h>
 
+#include "common/base/mutex.h"
 #include "common/surface/sparse_surface.h"
 
 namespace meshwright {
@@ -34,10 +34,10 @@ class SurfaceCache {
 
   const Loader loader_;
   const int64_t budget_bytes_;
-  std::mutex mutex_;
-  std::list<Entry> kept_;  // last used first
-  absl::flat_hash_map<std::string, std::list<Entry>::iterator> entry_of_digest_;
-  int64_t kept_bytes_ = 0;
+  Mutex mutex_;
+  std::list<Entry> kept_ ABSL_GUARDED_BY(mutex_);  // last used first
+  absl::flat_hash_map<std::string, std::list<Entry>::iterator> entry_of_digest_ ABSL_GUARDED_BY(mutex_);
+  int64_t kept_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace meshwright

@@ -38,12 +38,12 @@ prometheus::Histogram& Metrics::Histogram(const std::string& name, const std::st
 }
 
 void Metrics::BeforeEachScrape(std::function<void()> refresh) {
-  const std::lock_guard<std::mutex> lock(scraping_);
+  const MutexLock lock(scraping_);
   refreshes_.push_back(std::move(refresh));
 }
 
 std::string Metrics::Text() const {
-  const std::lock_guard<std::mutex> lock(scraping_);
+  const MutexLock lock(scraping_);
   for (const auto& refresh : refreshes_) refresh();
   std::vector<prometheus::MetricFamily> families = registry_.Collect();
   for (const auto& process : process_) {

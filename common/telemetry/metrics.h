@@ -2,7 +2,6 @@
 
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,8 @@
 #include <prometheus/gauge.h>
 #include <prometheus/histogram.h>
 #include <prometheus/registry.h>
+
+#include "common/base/mutex.h"
 
 namespace meshwright {
 
@@ -37,8 +38,8 @@ class Metrics {
  private:
   prometheus::Registry registry_;
   std::vector<std::shared_ptr<prometheus::Collectable>> process_;
-  mutable std::mutex scraping_;
-  std::vector<std::function<void()>> refreshes_;
+  mutable Mutex scraping_;
+  std::vector<std::function<void()>> refreshes_ ABSL_GUARDED_BY(scraping_);
 };
 
 // 1, 2, 5, 10, 20, 50 ... from `first` to `last`, which are such numbers themselves: for seconds and bytes alike.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "meshwright/v1/reconstruction.grpc.pb.h"
 #include "meshwright/v1/worker.grpc.pb.h"
 
+#include "common/base/mutex.h"
 #include "common/base/status_macros.h"
 
 namespace meshwright {
@@ -162,7 +162,7 @@ class WaitingWorker final : public grpc::ServerUnaryReactor {
       Finish(ToGrpc(answer.status()));
     });
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       is_known_ = true;
       if (!is_cancelled_) return;
     }
@@ -173,7 +173,7 @@ class WaitingWorker final : public grpc::ServerUnaryReactor {
   // service's thread, may come within it.
   void OnCancel() override {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       is_cancelled_ = true;
       if (!is_known_) return;
     }
@@ -184,9 +184,9 @@ class WaitingWorker final : public grpc::ServerUnaryReactor {
  private:
   WorkerService& service_;
   int64_t call_ = 0;
-  std::mutex mutex_;
-  bool is_known_ = false;
-  bool is_cancelled_ = false;
+  Mutex mutex_;
+  bool is_known_ ABSL_GUARDED_BY(mutex_) = false;
+  bool is_cancelled_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Synchronize<v1::WorkerService::Service> {

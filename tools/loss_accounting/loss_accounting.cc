@@ -142,14 +142,14 @@ void LossAccounting::RecordJob(const CameraJobInput& input, const CameraJobOptio
       if (truth.depth[node] > 0) outcomes[node] = OutcomeOfJob(input, scorer, options, grown, filtered, node);
     }
   });
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   outcomes_[camera] = std::move(outcomes);
 }
 
 void LossAccounting::RecordAccepted(const PatchLattice& accepted) {
   const auto camera = static_cast<size_t>(accepted.camera_index);
   const DepthMap& truth = truth_[camera];
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (outcomes_[camera].empty()) return;
   for (size_t node = 0; node < truth.depth.size(); ++node) {
     if (truth.depth[node] > 0 && IsRight(accepted.camera_index, node, accepted.depth[node])) {

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "tools/raycast/depth_map.h"
 #include "tools/raycast/mesh_ray_caster.h"
 
+#include "common/base/mutex.h"
 #include "common/base/thread_pool.h"
 #include "common/mesh/triangle_mesh.h"
 #include "common/surface/patch_lattice.h"
@@ -79,7 +79,7 @@ class LossAccounting {
   const std::vector<Camera> cameras_;
   std::vector<DepthMap> truth_;                 // per camera
   std::vector<std::vector<Outcome>> outcomes_;  // per camera and node
-  std::mutex mutex_;                            // over outcomes_
+  Mutex mutex_;                                 // over outcomes_
 };
 
 }  // namespace meshwright

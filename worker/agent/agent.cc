@@ -83,12 +83,12 @@ Agent::~Agent() {
 
 void Agent::Drain() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (draining_) return;
     draining_ = true;
     drain_until_ = absl::Now() + options_.drain;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   channel_.Interrupt();
 }
 
@@ -100,7 +100,7 @@ v1::SynchronizeRequest Agent::NextRequest() {
   request.set_version(options_.version);
   request.set_memory_bytes(options_.memory_bytes);
   request.set_ran_out_of_memory(options_.ran_out_of_memory);
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   int lost_cores = 0;
   for (auto& [key, held] : held_) {
     if (held.dropped) {
@@ -127,7 +127,7 @@ void Agent::Follow(const v1::SynchronizeResponse& response) {
   }
   std::vector<std::thread> ended;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     for (auto it = held_.begin(); it != held_.end();) {
       Held& held = it->second;
       const bool drop = held.dropped || wanted.count(it->first) == 0;
@@ -166,7 +166,7 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
     log.Info("job finished", {{"seconds", seconds}});
   }
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (told.has_finished()) failures_ = 0;
     if (told.has_failed() && told.failed().infrastructure()) {
       backoff_until_ = absl::Now() + std::min(kMaxBackoff, kMinBackoff * (int64_t{1} << std::min(failures_++, 20)));
@@ -175,7 +175,7 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
     held.told = std::move(told);
     held.running = false;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   channel_.Interrupt();
 }
 
@@ -211,7 +211,7 @@ v1::HeldJob Agent::Process(const v1::CameraJob& job) {
 }
 
 bool Agent::Finished() {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return draining_ && std::all_of(held_.begin(), held_.end(), [](const auto& entry) { return entry.second.dropped; });
 }
 
@@ -227,9 +227,9 @@ void Agent::Run() {
     if (last) return;
     if (response.ok() || absl::IsCancelled(response.status())) continue;
     log_.Warning("no answer from the coordinator", {{"error", std::string(response.status().message())}});
-    std::unique_lock<std::mutex> lock(mutex_);
+    MutexLock lock(mutex_);
     if (absl::Now() >= drain_until_) return;
-    wake_.wait_for(lock, retry);
+    wake_.WaitFor(lock, retry);
     retry = std::min(2 * retry, kLastRetry);
   }
 }

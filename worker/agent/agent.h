@@ -1,11 +1,9 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <tuple>
@@ -14,6 +12,7 @@
 
 #include "meshwright/v1/worker.pb.h"
 
+#include "common/base/mutex.h"
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
 #include "common/blob/lost_blob.h"
@@ -76,14 +75,14 @@ class Agent {
   JobContexts contexts_;
   ThreadPool pool_;
 
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::map<Key, Held> held_;
-  bool draining_ = false;
-  absl::Time drain_until_ = absl::InfiniteFuture();
+  Mutex mutex_;
+  ConditionVariable wake_;
+  std::map<Key, Held> held_ ABSL_GUARDED_BY(mutex_);
+  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
+  absl::Time drain_until_ ABSL_GUARDED_BY(mutex_) = absl::InfiniteFuture();
   // A worker that cannot reach the blobs leaves the jobs to others for a while.
-  int failures_ = 0;  // since the last job that finished
-  absl::Time backoff_until_ = absl::InfinitePast();
+  int failures_ ABSL_GUARDED_BY(mutex_) = 0;  // since the last job that finished
+  absl::Time backoff_until_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
 };
 
 }  // namespace meshwright

@@ -1,7 +1,6 @@
 #include "worker/agent/grpc_coordinator.h"
 
 #include <chrono>
-#include <mutex>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -10,6 +9,7 @@
 #include "meshwright/v1/worker.grpc.pb.h"
 
 #include "common/base/digest.h"
+#include "common/base/mutex.h"
 #include "common/base/status_macros.h"
 
 namespace meshwright {
@@ -37,14 +37,14 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
         std::chrono::system_clock::now() +
         std::chrono::milliseconds(static_cast<int64_t>(1000 * (request.wait_timeout_seconds() + kAnswerSeconds))));
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       if (std::exchange(interrupted_, false)) return absl::CancelledError("interrupted");
       waiting_ = &context;
     }
     v1::SynchronizeResponse response;
     const grpc::Status status = stub_->Synchronize(&context, request, &response);
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       waiting_ = nullptr;
     }
     if (!status.ok()) return FromGrpc(status);
@@ -52,7 +52,7 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
   }
 
   void Interrupt() override {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (waiting_ != nullptr) {
       waiting_->TryCancel();
     } else {
@@ -103,9 +103,9 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
 
  private:
   const std::unique_ptr<v1::WorkerService::Stub> stub_;
-  std::mutex mutex_;
-  grpc::ClientContext* waiting_ = nullptr;
-  bool interrupted_ = false;
+  Mutex mutex_;
+  grpc::ClientContext* waiting_ ABSL_GUARDED_BY(mutex_) = nullptr;
+  bool interrupted_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace

@@ -22,7 +22,7 @@ absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::For(const std::st
                                                                    const std::string& options_json, int reduction) {
   const std::string key = absl::StrCat(scene_digest, " ", reduction, " ", options_json);
   // Two jobs that want the same scene at the same time load it once; others wait, which is rare.
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   for (auto it = kept_.begin(); it != kept_.end(); ++it) {
     if (it->key != key) continue;
     kept_.splice(kept_.begin(), kept_, it);

@@ -3,12 +3,12 @@
 #include <functional>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include <absl/status/statusor.h>
 
+#include "common/base/mutex.h"
 #include "common/blob/blob_store.h"
 #include "common/scene/scene.h"
 #include "worker/camera_job/camera_job.h"
@@ -57,8 +57,8 @@ class JobContexts {
   BlobStore& blobs_;
   const JobConfigParser parse_;
   const int64_t cache_bytes_;
-  std::mutex mutex_;
-  std::list<Kept> kept_;  // the last one used first
+  Mutex mutex_;
+  std::list<Kept> kept_ ABSL_GUARDED_BY(mutex_);  // the last one used first
 };
 
 }  // namespace meshwright

@@ -42,11 +42,11 @@ void ViewCache::Keep(CameraIndex camera, const std::shared_ptr<const SamplingIma
 
 absl::StatusOr<std::shared_ptr<const SamplingImage>> ViewCache::Grey(CameraIndex camera) {
   {
-    std::unique_lock<std::mutex> lock(mutex_);
+    MutexLock lock(mutex_);
     while (true) {
       if (auto grey = Find(camera); grey != nullptr) return grey;
       if (!entries_[camera].loading) break;
-      loaded_.wait(lock);
+      loaded_.Wait(lock);
     }
     entries_[camera].loading = true;
   }
@@ -54,14 +54,14 @@ absl::StatusOr<std::shared_ptr<const SamplingImage>> ViewCache::Grey(CameraIndex
   std::shared_ptr<const SamplingImage> grey;
   if (view.ok()) grey = std::make_shared<const SamplingImage>(ToGrey(view->color), kSamplingLevels);
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     entries_[camera].loading = false;
     if (grey != nullptr) {
       ++decoded_views_;
       Keep(camera, grey);
     }
   }
-  loaded_.notify_all();
+  loaded_.NotifyAll();
   if (grey == nullptr) return view.status();
   return grey;
 }
@@ -70,13 +70,13 @@ absl::StatusOr<ViewCache::Reference> ViewCache::GreyAndColor(CameraIndex camera)
   MW_ASSIGN_OR_RETURN(View view, loader_(camera));
   Reference reference;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     ++decoded_views_;
     reference.grey = Find(camera);
   }
   if (reference.grey == nullptr) {
     reference.grey = std::make_shared<const SamplingImage>(ToGrey(view.color), kSamplingLevels);
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     Keep(camera, reference.grey);
   }
   reference.color = std::make_shared<const ColorImage>(std::move(view.color));
@@ -84,7 +84,7 @@ absl::StatusOr<ViewCache::Reference> ViewCache::GreyAndColor(CameraIndex camera)
 }
 
 int64_t ViewCache::decoded_views() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return decoded_views_;
 }
 

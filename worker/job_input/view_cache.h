@@ -1,15 +1,14 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 
 #include <absl/status/statusor.h>
 
 #include "common/base/ids.h"
+#include "common/base/mutex.h"
 #include "common/image/color_image.h"
 #include "common/image/sampling_image.h"
 #include "common/scene/view.h"
@@ -51,18 +50,18 @@ class ViewCache {
     bool loading = false;
   };
 
-  // Nullptr when it has to be loaded. Needs the lock.
-  std::shared_ptr<const SamplingImage> Find(CameraIndex camera);
-  void Keep(CameraIndex camera, const std::shared_ptr<const SamplingImage>& grey);
+  // Nullptr when it has to be loaded.
+  std::shared_ptr<const SamplingImage> Find(CameraIndex camera) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Keep(CameraIndex camera, const std::shared_ptr<const SamplingImage>& grey) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const Loader loader_;
   const int64_t budget_bytes_;
-  mutable std::mutex mutex_;
-  std::condition_variable loaded_;
-  std::map<CameraIndex, Entry> entries_;
-  int64_t kept_bytes_ = 0;
-  int64_t uses_ = 0;
-  int64_t decoded_views_ = 0;
+  mutable Mutex mutex_;
+  ConditionVariable loaded_;
+  std::map<CameraIndex, Entry> entries_ ABSL_GUARDED_BY(mutex_);
+  int64_t kept_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
+  int64_t uses_ ABSL_GUARDED_BY(mutex_) = 0;
+  int64_t decoded_views_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace meshwright

@@ -64,7 +64,7 @@ absl::StatusOr<v1::SynchronizeResponse> MeasuredWorkerChannel::Synchronize(const
                 absl::IsCancelled(response.status()) ? absl::OkStatus() : response.status());
   if (!response.ok()) return response;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     last_answer_ = now;
   }
   CountAnswer(request, *response);
@@ -72,7 +72,7 @@ absl::StatusOr<v1::SynchronizeResponse> MeasuredWorkerChannel::Synchronize(const
 }
 
 absl::Status MeasuredWorkerChannel::Ready() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!last_answer_.has_value()) return absl::UnavailableError("the coordinator has not answered yet");
   const absl::Duration silence = clock_.Now() - *last_answer_;
   if (silence <= kSilence) return absl::OkStatus();

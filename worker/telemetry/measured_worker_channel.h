@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -16,6 +15,7 @@
 #include <prometheus/histogram.h>
 
 #include "common/base/clock.h"
+#include "common/base/mutex.h"
 #include "common/telemetry/metrics.h"
 #include "worker/agent/worker_channel.h"
 
@@ -57,8 +57,8 @@ class MeasuredWorkerChannel final : public WorkerChannel {
   std::map<Key, absl::Time> begun_;
   std::set<Key> counted_;  // their outcome is counted, and they are told still
 
-  mutable std::mutex mutex_;
-  std::optional<absl::Time> last_answer_;
+  mutable Mutex mutex_;
+  std::optional<absl::Time> last_answer_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace meshwright
