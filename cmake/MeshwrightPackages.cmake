@@ -32,13 +32,23 @@ if(MW_GZIP)
 
  -- ${CPACK_PACKAGE_CONTACT}  ${date}
 ")
-  foreach(file changelog.Debian changelog)
-    if(file STREQUAL "changelog")
-      configure_file(${PROJECT_SOURCE_DIR}/CHANGELOG.md ${made}/changelog COPYONLY)
-    endif()
-    execute_process(COMMAND ${MW_GZIP} -9nkf ${made}/${file})
-  endforeach()
+  configure_file(${PROJECT_SOURCE_DIR}/CHANGELOG.md ${made}/changelog COPYONLY)
+  execute_process(COMMAND ${MW_GZIP} -9nkf ${made}/changelog.Debian ${made}/changelog)
 endif()
+
+foreach(page meshwright meshwright-coordinator meshwright-worker)
+  set(component server)
+  if(page STREQUAL "meshwright")
+    set(component cli)
+  endif()
+  set(manual ${PROJECT_SOURCE_DIR}/docs/man/${page}.1)
+  if(MW_GZIP)
+    configure_file(${manual} ${made}/${page}.1 COPYONLY)
+    execute_process(COMMAND ${MW_GZIP} -9nkf ${made}/${page}.1)
+    set(manual ${made}/${page}.1.gz)
+  endif()
+  install(FILES ${manual} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ${component})
+endforeach()
 
 foreach(component IN LISTS components)
   set(folder ${documentation}/${package_of_${component}})
@@ -71,9 +81,9 @@ set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
   OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 
 # dpkg's "Description": a line of what it is, then lines of why.
-set(method " It grows surfaces camera by camera (Jancosek, Shekhovtsov, Pajdla: Scalable
- Multi-View Stereo, 2009), so that effort follows the surface and memory does
- not follow the number of photographs.")
+set(method "It grows surfaces camera by camera (Jancosek, Shekhovtsov, Pajdla: Scalable
+Multi-View Stereo, 2009), so that effort follows the surface and memory does
+not follow the number of photographs.")
 set(CPACK_DEBIAN_CLI_PACKAGE_NAME meshwright)
 set(CPACK_DEBIAN_CLI_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_CLI_PACKAGE_RECOMMENDS meshwright-dashboard)
@@ -85,23 +95,23 @@ set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/deploy/debia
   ${PROJECT_SOURCE_DIR}/deploy/debian/server/postinst ${PROJECT_SOURCE_DIR}/deploy/debian/server/prerm
   ${PROJECT_SOURCE_DIR}/deploy/debian/server/postrm)
 set(CPACK_COMPONENT_SERVER_DESCRIPTION "multi-view stereo as a service: coordinator and worker
- The coordinator decides which camera is processed next and makes the mesh; any
- number of workers on any machines do the processing. Both come as systemd
- units, which are started by the administrator: systemctl enable --now
- meshwright-coordinator meshwright-worker.")
+The coordinator decides which camera is processed next and makes the mesh; any
+number of workers on any machines do the processing. Both come as systemd
+units, which are started by the administrator: systemctl enable --now
+meshwright-coordinator meshwright-worker.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libmeshwright-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libabsl-dev, libeigen3-dev (>= 3.4), libhwy-dev, libjpeg-dev, libmeshoptimizer-dev, \
 libpng-dev, libsqlite3-dev, libssl-dev, zlib1g-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "multi-view stereo as a C++ library
- Headers, the static library and the CMake package Meshwright: a reconstruction
- in the process of another program.")
+Headers, the static library and the CMake package Meshwright: a reconstruction
+in the process of another program.")
 set(CPACK_DEBIAN_DASHBOARD_PACKAGE_NAME meshwright-dashboard)
 set(CPACK_DEBIAN_DASHBOARD_PACKAGE_SECTION web)
 set(CPACK_DEBIAN_DASHBOARD_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_DASHBOARD_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_COMPONENT_DASHBOARD_DESCRIPTION "multi-view stereo as a service: the web page
- What meshwright up and the coordinator of meshwright-server show in a browser:
- the mesh in 3D as it grows, its cameras, the workers.")
+What meshwright up and the coordinator of meshwright-server show in a browser:
+the mesh in 3D as it grows, its cameras, the workers.")
 include(CPack)

@@ -29,6 +29,9 @@ function(mw_add_library NAME)
   endif()
 endfunction()
 
+# The tests of single rooms, which take seconds: what runs under sanitizers.
+add_custom_target(unit_tests)
+
 # mw_add_test(NAME SRCS a_test.cc ... DEPS target ... [TIMEOUT seconds])
 function(mw_add_test NAME)
   if(NOT BUILD_TESTING)
@@ -43,6 +46,11 @@ function(mw_add_test NAME)
   set_target_properties(${NAME} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
   add_test(NAME ${NAME} COMMAND ${NAME} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   set_tests_properties(${NAME} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  file(RELATIVE_PATH room ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  if(NOT room MATCHES "^tests/")
+    add_dependencies(unit_tests ${NAME})
+    set_tests_properties(${NAME} PROPERTIES LABELS unit)
+  endif()
 endfunction()
 
 # mw_add_benchmark(NAME SRCS a_benchmark.cc ... DEPS target ...)
