@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "coordinator/incidence/cameras_testing.h"
 #include "coordinator/incidence/feasible_pairs.h"
-#include "coordinator/incidence/test_cameras.h"
 
 namespace meshwright {
 namespace {

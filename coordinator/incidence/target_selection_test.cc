@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "coordinator/incidence/test_cameras.h"
+#include "coordinator/incidence/cameras_testing.h"
 
 namespace meshwright {
 namespace {

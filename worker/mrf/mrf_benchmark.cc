@@ -2,7 +2,7 @@
 
 #include "common/base/thread_pool.h"
 #include "worker/mrf/solve.h"
-#include "worker/mrf/synthetic_mrf.h"
+#include "worker/mrf/synthetic_mrf_testing.h"
 
 namespace meshwright {
 namespace {

@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "worker/mrf/synthetic_mrf.h"
+#include "worker/mrf/synthetic_mrf_testing.h"
 
 namespace meshwright {
 namespace {

@@ -1,4 +1,4 @@
-#include "worker/mrf/synthetic_mrf.h"
+#include "worker/mrf/synthetic_mrf_testing.h"
 
 #include <algorithm>
 #include <cmath>
