@@ -58,6 +58,99 @@ function ticks(begin: number, end: number, most: number): number[] {
   return found;
 }
 
+interface Axes {
+  begin: number; // ms
+  end: number; // ms
+  labels: number; // px, width of the column with the workers' names
+  x: (time: number) => number; // px
+}
+
+function drawTimeline(
+  context: CanvasRenderingContext2D,
+  workers: readonly string[],
+  bars: readonly Bar[],
+  { begin, end, labels, x }: Axes,
+  width: number,
+  height: number,
+) {
+  const colors = Object.fromEntries(
+    Object.entries(ENDINGS).map(([ending, [, name]]) => [ending, cssColor(name)]),
+  ) as Record<AttemptEnding, string>;
+  context.font = `12px ${cssColor('--font')}`;
+  context.textBaseline = 'middle';
+  context.fillStyle = cssColor('--text-2');
+  context.strokeStyle = cssColor('--line');
+  if (bars.length === 0) return;
+  for (const at of ticks(begin, end, Math.max(2, (width - labels) / 90))) {
+    context.beginPath();
+    context.moveTo(x(at) + 0.5, 0);
+    context.lineTo(x(at) + 0.5, height - AXIS_PX);
+    context.stroke();
+    context.fillText(clock(new Date(at).toISOString()), Math.min(x(at), width - 52), height - AXIS_PX / 2 + 2);
+  }
+  context.save();
+  context.beginPath();
+  context.rect(0, 0, labels - 8, height);
+  context.clip();
+  workers.forEach((worker, row) => context.fillText(worker, 0, (row + 0.5) * ROW_PX));
+  context.restore();
+  for (const bar of bars) {
+    if (bar.end < begin) continue;
+    const left = x(Math.max(bar.begin, begin));
+    const wide = Math.max(x(bar.end) - left - 0.7, 1.2);
+    const bad = isTrouble(bar.ending);
+    context.fillStyle = colors[bar.ending];
+    context.fillRect(left, bar.row * ROW_PX + 4, bad ? Math.max(wide, 3) : wide, ROW_PX - 8);
+    if (bar.ending === 'LOST') {
+      // Not by colour alone.
+      context.fillStyle = cssColor('--surface');
+      context.fillRect(left, bar.row * ROW_PX + ROW_PX / 2 - 1.5, Math.max(wide, 3), 3);
+    }
+  }
+}
+
+interface TroublesProps {
+  troubles: readonly Bar[];
+  nameOf: (camera: number) => string;
+  onSelect: (camera: number) => void;
+}
+
+function Troubles({ troubles, nameOf, onSelect }: TroublesProps) {
+  return (
+    <details class="troubles">
+      <summary>What failed or was lost</summary>
+      <div class="table-wrap">
+        <table class="small">
+          <thead>
+            <tr>
+              <th>When</th>
+              <th>Camera</th>
+              <th>Worker</th>
+              <th>Ending</th>
+              <th>Reason</th>
+            </tr>
+          </thead>
+          <tbody>
+            {troubles.slice(-100).map(({ attempt, ending }) => (
+              <tr key={`${attempt.sequence}-${attempt.beginTime}`}>
+                <td>{clock(attempt.beginTime)}</td>
+                <td>
+                  <button class="link" onClick={() => onSelect(attempt.camera)}>
+                    {nameOf(attempt.camera)}
+                  </button>
+                </td>
+                <td>{attempt.worker}</td>
+                <td>{ENDINGS[ending][0]}</td>
+                <td>{attempt.reason}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </div>
+    </details>
+  );
+}
+
 export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; onSelect: (camera: number) => void }) {
   const box = useRef<HTMLDivElement>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -79,41 +172,7 @@ export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; 
 
   useEffect(() => {
     if (width === 0 || canvas.current === null) return;
-    const context = prepareCanvas(canvas.current, width, height);
-    const colors = Object.fromEntries(
-      Object.entries(ENDINGS).map(([ending, [, name]]) => [ending, cssColor(name)]),
-    ) as Record<AttemptEnding, string>;
-    context.font = `12px ${cssColor('--font')}`;
-    context.textBaseline = 'middle';
-    context.fillStyle = cssColor('--text-2');
-    context.strokeStyle = cssColor('--line');
-    if (bars.length === 0) return;
-    for (const at of ticks(begin, end, Math.max(2, (width - labels) / 90))) {
-      context.beginPath();
-      context.moveTo(x(at) + 0.5, 0);
-      context.lineTo(x(at) + 0.5, height - AXIS_PX);
-      context.stroke();
-      context.fillText(clock(new Date(at).toISOString()), Math.min(x(at), width - 52), height - AXIS_PX / 2 + 2);
-    }
-    context.save();
-    context.beginPath();
-    context.rect(0, 0, labels - 8, height);
-    context.clip();
-    workers.forEach((worker, row) => context.fillText(worker, 0, (row + 0.5) * ROW_PX));
-    context.restore();
-    for (const bar of bars) {
-      if (bar.end < begin) continue;
-      const left = x(Math.max(bar.begin, begin));
-      const wide = Math.max(x(bar.end) - left - 0.7, 1.2);
-      const bad = isTrouble(bar.ending);
-      context.fillStyle = colors[bar.ending];
-      context.fillRect(left, bar.row * ROW_PX + 4, bad ? Math.max(wide, 3) : wide, ROW_PX - 8);
-      if (bar.ending === 'LOST') {
-        // Not by colour alone.
-        context.fillStyle = cssColor('--surface');
-        context.fillRect(left, bar.row * ROW_PX + ROW_PX / 2 - 1.5, Math.max(wide, 3), 3);
-      }
-    }
+    drawTimeline(prepareCanvas(canvas.current, width, height), workers, bars, { begin, end, labels, x }, width, height);
   }, [bars, width, height, begin, end, theme.value]);
 
   const barAt = (event: MouseEvent): Bar | null => {
@@ -175,39 +234,7 @@ export function TimelineCard({ store, onSelect }: { store: ReconstructionStore; 
           </li>
         ))}
       </ul>
-      {troubles.length > 0 && (
-        <details class="troubles">
-          <summary>What failed or was lost</summary>
-          <div class="table-wrap">
-            <table class="small">
-              <thead>
-                <tr>
-                  <th>When</th>
-                  <th>Camera</th>
-                  <th>Worker</th>
-                  <th>Ending</th>
-                  <th>Reason</th>
-                </tr>
-              </thead>
-              <tbody>
-                {troubles.slice(-100).map(({ attempt, ending }) => (
-                  <tr key={`${attempt.sequence}-${attempt.beginTime}`}>
-                    <td>{clock(attempt.beginTime)}</td>
-                    <td>
-                      <button class="link" onClick={() => onSelect(attempt.camera)}>
-                        {name(attempt.camera)}
-                      </button>
-                    </td>
-                    <td>{attempt.worker}</td>
-                    <td>{ENDINGS[ending][0]}</td>
-                    <td>{attempt.reason}</td>
-                  </tr>
-                ))}
-              </tbody>
-            </table>
-          </div>
-        </details>
-      )}
+      {troubles.length > 0 && <Troubles troubles={troubles} nameOf={name} onSelect={onSelect} />}
     </Card>
   );
 }

@@ -1,5 +1,6 @@
 // The mesh in 3D as it grows, and what can be done with the view.
 import { useSignalEffect } from '@preact/signals';
+import type { RefObject } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { reconstructionUrl } from '../api/client';
 import { CAMERA_STATES, isOver, stateOf } from '../api/types';
@@ -31,17 +32,21 @@ interface Props {
   onSelect: (camera: number) => void;
 }
 
-export function ViewerPanel({ store, selected, onSelect }: Props) {
-  const canvas = useRef<HTMLCanvasElement>(null);
-  const frame = useRef<HTMLDivElement>(null);
+interface ViewerNumbers {
+  parts: number;
+  faces: number;
+  shown: number;
+  complete: boolean;
+}
+
+// The 3D view on a canvas, fed from the store: null until three.js is there. `failure` says why there is none.
+function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSelect }: Props) {
   const [viewer, setViewer] = useState<SceneViewer | null>(null);
   const [loader, setLoader] = useState<PartLoader | null>(null);
   const [failure, setFailure] = useState('');
   const rest = useRef(() => {});
   const frameTook = useRef((_milliseconds: number) => {});
-  const [coloring, setColoring] = useState<Coloring>('photo');
-  const [frusta, setFrusta] = useState(true);
-  const [numbers, setNumbers] = useState({ parts: 0, faces: 0, shown: 0, complete: false });
+  const [numbers, setNumbers] = useState<ViewerNumbers>({ parts: 0, faces: 0, shown: 0, complete: false });
 
   useEffect(() => {
     let closed = false;
@@ -118,9 +123,19 @@ export function ViewerPanel({ store, selected, onSelect }: Props) {
     loader?.add(store.parts.value);
   }, [viewer, loader]);
   useEffect(() => viewer?.setBackground(cssColor('--stage')), [viewer, theme.value]);
+  useEffect(() => viewer?.select(selected), [viewer, selected, store.cameras.value]);
+  return { viewer, failure, numbers };
+}
+
+export function ViewerPanel(props: Props) {
+  const { store, selected } = props;
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const frame = useRef<HTMLDivElement>(null);
+  const { viewer, failure, numbers } = useViewer(canvas, props);
+  const [coloring, setColoring] = useState<Coloring>('photo');
+  const [frusta, setFrusta] = useState(true);
   useEffect(() => viewer?.setColoring(coloring), [viewer, coloring]);
   useEffect(() => viewer?.showFrusta(frusta), [viewer, frusta]);
-  useEffect(() => viewer?.select(selected), [viewer, selected, store.cameras.value]);
 
   const onKeyDown = (event: KeyboardEvent) => {
     if (viewer === null || event.ctrlKey || event.metaKey || event.altKey) return;

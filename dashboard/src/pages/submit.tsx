@@ -178,6 +178,104 @@ function UploadStatus({ progress, startMs }: { progress: UploadProgress; startMs
   );
 }
 
+interface SceneFieldProps {
+  files: FileToSend[];
+  onFiles: (files: FileToSend[], name: string) => void;
+  reference: string;
+  onReference: (reference: string) => void;
+  busy: boolean;
+}
+
+function SceneField({ files, onFiles, reference, onReference, busy }: SceneFieldProps) {
+  const summary = describeScene(files);
+  return (
+    <section class="card" aria-label="Scene">
+      <div class="body">
+        <DropZone onFiles={onFiles} />
+        {files.length > 0 && (
+          <div class="found" role="status">
+            {summary.format === null ? (
+              <Notice tone="warning">
+                {count(summary.photographs)} photographs, but no cameras of COLMAP, Middlebury or Strecha among the
+                files.
+              </Notice>
+            ) : (
+              <Notice>
+                <strong>{summary.format} scene</strong>: {count(summary.photographs)} photographs, {count(files.length)}{' '}
+                files, {bytes(summary.bytes)}
+              </Notice>
+            )}
+            <button type="button" class="button small" onClick={() => onFiles([], '')} disabled={busy}>
+              Take others
+            </button>
+          </div>
+        )}
+        {files.length === 0 && (
+          <div class="field">
+            <label for="reference">Or a folder that the coordinator sees</label>
+            <input
+              id="reference"
+              class="wide"
+              placeholder="file:campaign/7"
+              value={reference}
+              onInput={(event) => onReference(event.currentTarget.value)}
+            />
+          </div>
+        )}
+      </div>
+    </section>
+  );
+}
+
+interface NameAndShareProps {
+  id: string;
+  onId: (id: string) => void;
+  weight: string;
+  onWeight: (weight: string) => void;
+}
+
+function NameAndShare({ id, onId, weight, onWeight }: NameAndShareProps) {
+  return (
+    <section class="card" aria-label="Name and share">
+      <div class="body fields">
+        <div class="field grow">
+          <label for="id">Name</label>
+          <input
+            id="id"
+            class="wide"
+            value={id}
+            required
+            maxLength={64}
+            pattern="[a-z0-9][a-z0-9\-]*"
+            aria-describedby="id-help"
+            onInput={(event) => onId(event.currentTarget.value)}
+          />
+          <p id="id-help" class="muted small">
+            a–z, 0–9 and “-”. Submitting again under the same name goes on with an interrupted upload.
+          </p>
+        </div>
+        <div class="field">
+          <label for="weight">Weight</label>
+          <input
+            id="weight"
+            type="number"
+            min="0.01"
+            max="1000"
+            step="any"
+            value={weight}
+            required
+            aria-describedby="weight-help"
+            onInput={(event) => onWeight(event.currentTarget.value)}
+          />
+          <p id="weight-help" class="muted small">
+            share of the workers
+          </p>
+        </div>
+      </div>
+    </section>
+  );
+}
+
 export default function SubmitPage() {
   const [files, setFiles] = useState<FileToSend[]>([]);
   const [reference, setReference] = useState('');
@@ -202,7 +300,6 @@ export default function SubmitPage() {
     return () => window.removeEventListener('beforeunload', warn);
   }, [busy]);
 
-  const summary = describeScene(files);
   const takeFiles = (taken: FileToSend[], name: string) => {
     setFiles(taken);
     if (id === '' && name !== '') setId(idFrom(name));
@@ -257,78 +354,8 @@ export default function SubmitPage() {
       </div>
       <form class="submit" onSubmit={(event) => void submit(event)}>
         <div class="submit-main">
-          <section class="card" aria-label="Scene">
-            <div class="body">
-              <DropZone onFiles={takeFiles} />
-              {files.length > 0 && (
-                <div class="found" role="status">
-                  {summary.format === null ? (
-                    <Notice tone="warning">
-                      {count(summary.photographs)} photographs, but no cameras of COLMAP, Middlebury or Strecha among
-                      the files.
-                    </Notice>
-                  ) : (
-                    <Notice>
-                      <strong>{summary.format} scene</strong>: {count(summary.photographs)} photographs,{' '}
-                      {count(files.length)} files, {bytes(summary.bytes)}
-                    </Notice>
-                  )}
-                  <button type="button" class="button small" onClick={() => setFiles([])} disabled={busy}>
-                    Take others
-                  </button>
-                </div>
-              )}
-              {files.length === 0 && (
-                <div class="field">
-                  <label for="reference">Or a folder that the coordinator sees</label>
-                  <input
-                    id="reference"
-                    class="wide"
-                    placeholder="file:campaign/7"
-                    value={reference}
-                    onInput={(event) => setReference(event.currentTarget.value)}
-                  />
-                </div>
-              )}
-            </div>
-          </section>
-          <section class="card" aria-label="Name and share">
-            <div class="body fields">
-              <div class="field grow">
-                <label for="id">Name</label>
-                <input
-                  id="id"
-                  class="wide"
-                  value={id}
-                  required
-                  maxLength={64}
-                  pattern="[a-z0-9][a-z0-9\-]*"
-                  aria-describedby="id-help"
-                  onInput={(event) => setId(event.currentTarget.value)}
-                />
-                <p id="id-help" class="muted small">
-                  a–z, 0–9 and “-”. Submitting again under the same name goes on with an interrupted upload.
-                </p>
-              </div>
-              <div class="field">
-                <label for="weight">Weight</label>
-                <input
-                  id="weight"
-                  type="number"
-                  min="0.01"
-                  max="1000"
-                  step="any"
-                  value={weight}
-                  required
-                  aria-describedby="weight-help"
-                  onInput={(event) => setWeight(event.currentTarget.value)}
-                />
-                <p id="weight-help" class="muted small">
-                  share of the workers
-                </p>
-              </div>
-            </div>
-          </section>
+          <SceneField files={files} onFiles={takeFiles} reference={reference} onReference={setReference} busy={busy} />
+          <NameAndShare id={id} onId={setId} weight={weight} onWeight={setWeight} />
           {failure !== '' && <Notice tone="danger">{failure}</Notice>}
           {busy && progress !== null && <UploadStatus progress={progress} startMs={startMs.current} />}
           <button class="button primary big" disabled={!ready}>
