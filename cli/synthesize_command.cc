@@ -1,4 +1,5 @@
 #include <memory>
+#include <optional>
 
 #include <absl/strings/str_cat.h>
 
@@ -14,13 +15,18 @@ namespace {
 constexpr char kExamples[] = R"(Examples:
   meshwright synthesize facade -o facade
   meshwright synthesize ring -o ring --cameras 47 --width 640 --height 480
+  meshwright synthesize room -o room --cameras 48 --width 960 --height 720 --points 0
   meshwright synthesize street -o street --cameras 200 --seed 7
+A room is photographed as people do: exposures, compression and cameras are a little off unless told otherwise.
 FOLDER gets model/ (COLMAP text), images/ and ground_truth.ply: meshwright reconstruct FOLDER reads it.)";
 
 struct Arguments {
   std::string kind;
   std::string folder;
   SyntheticOptions options;
+  std::optional<double> exposure_ev;
+  std::optional<int> jpeg_quality;
+  std::optional<double> camera_noise_px;
   int threads = AvailableCores();
   OutputSettings output;
 };
@@ -34,7 +40,12 @@ absl::Status Synthesize(const Arguments& arguments) {
 int RunCommand(Arguments& arguments) {
   absl::StatusOr<SyntheticKind> kind = ParseSyntheticKind(arguments.kind);
   if (!kind.ok()) return FailWrongUse(std::string(kind.status().message()));
-  arguments.options.kind = *kind;
+  SyntheticOptions& options = arguments.options;
+  options.kind = *kind;
+  const bool in_a_room = *kind == SyntheticKind::kRoom;
+  options.exposure_ev = arguments.exposure_ev.value_or(in_a_room ? 0.5 : 0);
+  options.jpeg_quality = arguments.jpeg_quality.value_or(in_a_room ? 60 : 0);
+  options.camera_noise_px = arguments.camera_noise_px.value_or(in_a_room ? 0.5 : 0);
   if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
     return FailWrongUse(std::string(valid.message()));
   }
@@ -57,7 +68,7 @@ void AddSynthesizeCommand(CLI::App& program, Run& run) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("synthesize", "Make a scene with exact ground truth");
   command.footer(kExamples);
-  command.add_option("KIND", arguments->kind, "facade, ring or street")->required();
+  command.add_option("KIND", arguments->kind, "facade, ring, room or street")->required();
   command.add_option("-o,--output", arguments->folder, "folder to write")->required();
   SyntheticOptions& options = arguments->options;
   command.add_option("--cameras", options.cameras, "photographs, 2..1000; facade at most 24")->capture_default_str();
@@ -65,6 +76,12 @@ void AddSynthesizeCommand(CLI::App& program, Run& run) {
   command.add_option("--height", options.height, "of a photograph, px, 64..8192")->capture_default_str();
   command.add_option("--seed", options.seed, "of everything that is drawn by lot")->capture_default_str();
   command.add_option("--noise", options.noise_sigma, "of the sensor, grey levels, 0..50")->capture_default_str();
+  command.add_option("--exposure-ev", arguments->exposure_ev,
+                     "exposures differ by up to so much from the mean, EV, 0..4 [0.5 in a room, else 0]");
+  command.add_option("--jpeg-quality", arguments->jpeg_quality,
+                     "photographs went through JPEG, 1..100; 0: not [60 in a room, else 0]");
+  command.add_option("--camera-noise", arguments->camera_noise_px,
+                     "by how much the cameras that are told are off, px, 0..20 [0.5 in a room, else 0]");
   command
       .add_option("--points", options.sparse_points_per_camera,
                   "sparse points per camera, as structure from motion would find; 0: none")

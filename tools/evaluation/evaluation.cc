@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <optional>
 #include <vector>
 
 #include <absl/strings/str_format.h>
@@ -18,6 +20,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kSurfaceSamples = 100000;  // for Middlebury's figures
+constexpr double kSameSurface = 2;       // pixel footprints along the ray, within which normals are compared
 constexpr size_t kThresholdCount = EvaluationReport::kThresholds.size();
 
 // What one row of one picture adds to the report.
@@ -29,8 +32,12 @@ struct Counts {
   std::array<int64_t, kThresholdCount> recalled = {};
   std::array<int64_t, kThresholdCount> precise = {};
   std::array<int64_t, kThresholdCount> depth_right = {};
-  std::vector<float> footprints;  // scene units, of the ground-truth pixels
-  std::vector<float> accuracies;  // in g, of the reconstruction's pixels
+  std::vector<float> footprints;     // scene units, of the ground-truth pixels
+  std::vector<float> accuracies;     // in g, of the reconstruction's pixels
+  std::vector<float> normal_errors;  // degrees
+  double turns = 0;                  // degrees, summed over pairs of neighbouring pixels
+  double ground_truth_turns = 0;
+  int64_t pairs = 0;
 
   void Add(const Counts& other) {
     ground_truth += other.ground_truth;
@@ -44,6 +51,10 @@ struct Counts {
     }
     footprints.insert(footprints.end(), other.footprints.begin(), other.footprints.end());
     accuracies.insert(accuracies.end(), other.accuracies.begin(), other.accuracies.end());
+    normal_errors.insert(normal_errors.end(), other.normal_errors.begin(), other.normal_errors.end());
+    turns += other.turns;
+    ground_truth_turns += other.ground_truth_turns;
+    pairs += other.pairs;
   }
 };
 
@@ -58,6 +69,16 @@ double Quantile(std::vector<T> values, double share) {
 
 double Share(int64_t part, int64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+// The normals at a pixel where both surfaces are the same one.
+struct PixelNormals {
+  Eigen::Vector3d reconstruction;
+  Eigen::Vector3d ground_truth;
+};
+
+double DegreesBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::acos(std::clamp(a.dot(b), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
 // The two surfaces with what is asked of them.
@@ -85,11 +106,15 @@ class Comparison {
       pool_.ParallelFor(truth.lattice.rows, 1, [&](int64_t begin, int64_t end) {
         for (int64_t row = begin; row < end; ++row) {
           Counts& counts = rows[static_cast<size_t>(row)];
+          std::optional<PixelNormals> left;
           for (int column = 0; column < truth.lattice.columns; ++column) {
             const int64_t node = truth.lattice.Index(column, static_cast<int>(row));
             if (truth.depth[static_cast<size_t>(node)] > 0) {
               CountPixel(camera, truth, seen, static_cast<size_t>(node), counts);
             }
+            const std::optional<PixelNormals> here = NormalsAt(camera, truth, seen, static_cast<size_t>(node));
+            CountNormals(left, here, counts);
+            left = here;
           }
         }
       });
@@ -137,6 +162,29 @@ class Comparison {
  private:
   bool IsSeen(const Eigen::Vector3d& x, const Eigen::Vector3d& normal) const {
     return IsSeenByEnough(ground_truth_caster_, cameras_, x, normal, options_.min_views, options_.occlusion_tolerance);
+  }
+
+  std::optional<PixelNormals> NormalsAt(const Camera& camera, const SeenSurface& truth, const SeenSurface& seen,
+                                        size_t node) const {
+    if (reconstruction_.faces.empty() || !(truth.depth[node] > 0) || !(seen.depth[node] > 0)) return std::nullopt;
+    const double g = truth.depth[node] / camera.focal();
+    if (std::abs(seen.depth[node] - truth.depth[node]) > kSameSurface * g) return std::nullopt;
+    const Eigen::Vector3d ray = truth.x_in_world[node] - camera.center_in_world();
+    const auto towards_camera = [&](Eigen::Vector3d normal) {
+      return normal.dot(ray) > 0 ? Eigen::Vector3d(-normal) : normal;
+    };
+    return PixelNormals{towards_camera(reconstruction_caster_.FaceNormal(seen.face[node])),
+                        towards_camera(ground_truth_caster_.FaceNormal(truth.face[node]))};
+  }
+
+  static void CountNormals(const std::optional<PixelNormals>& left, const std::optional<PixelNormals>& here,
+                           Counts& counts) {
+    if (!here.has_value()) return;
+    counts.normal_errors.push_back(static_cast<float>(DegreesBetween(here->reconstruction, here->ground_truth)));
+    if (!left.has_value()) return;
+    counts.turns += DegreesBetween(left->reconstruction, here->reconstruction);
+    counts.ground_truth_turns += DegreesBetween(left->ground_truth, here->ground_truth);
+    ++counts.pairs;
   }
 
   // A pixel with ground truth.
@@ -246,6 +294,19 @@ absl::StatusOr<EvaluationReport> Evaluate(const TriangleMesh& reconstruction, co
   }
   report.missing = Share(counts.missing, counts.ground_truth);
   report.median_accuracy_g = Quantile(std::move(counts.accuracies), 0.5);
+  if (!counts.normal_errors.empty()) {
+    const auto within = [&](float degrees) {
+      return Share(std::ranges::count_if(counts.normal_errors, [=](float error) { return error <= degrees; }),
+                   static_cast<int64_t>(counts.normal_errors.size()));
+    };
+    report.normals_within_10_deg = within(10);
+    report.normals_within_30_deg = within(30);
+    report.median_normal_error_deg = Quantile(std::move(counts.normal_errors), 0.5);
+  }
+  if (counts.pairs > 0) {
+    report.roughness_deg = counts.turns / static_cast<double>(counts.pairs);
+    report.ground_truth_roughness_deg = counts.ground_truth_turns / static_cast<double>(counts.pairs);
+  }
   report.median_footprint = Quantile(std::move(counts.footprints), 0.5);
   report.ground_truth_pixels = counts.ground_truth;
   report.recall_pixels = counts.seen_by_enough;

@@ -42,6 +42,16 @@ struct EvaluationReport {
   double missing = 0;            // share of all ground-truth pixels without reconstruction along the ray
   double median_accuracy_g = 0;  // distance to the ground truth, in g, over the pixels of precision; infinite beyond 8
 
+  // Normals of two meshes, where the reconstruction's pixel lies within 2 g of the ground truth's: of the triangles, so
+  // what shading shows. Degrees; 0 for clouds.
+  double median_normal_error_deg = 0;
+  double normals_within_10_deg = 0;  // share
+  double normals_within_30_deg = 0;  // share
+  // Mean angle between the normals at one pixel and at the next one looked at to its right, and the ground truth's
+  // there.
+  double roughness_deg = 0;
+  double ground_truth_roughness_deg = 0;
+
   // Seitz et al. 2006, over points spread evenly over the surfaces (all points of a cloud; Middlebury: vertices).
   double accuracy_90 = 0;            // scene units; 90 % of the reconstruction is this near to the ground truth
   double completeness = 0;           // share of the ground truth, where min_views cameras see it, within the distance

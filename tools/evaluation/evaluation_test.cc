@@ -219,5 +219,39 @@ TEST(SampleSurfaceTest, PointsAreSpreadByArea) {
   EXPECT_NEAR(on_small, 250, 2);
 }
 
+// A sheet of ridges whose two sides are tilted by `degrees` from the plane z.
+TriangleMesh Ridges(double degrees, double z) {
+  TriangleMesh mesh = Sheet(-12, 12, -9, 9, z, 240, 4);
+  const double slope = std::tan(degrees * 3.14159265358979323846 / 180);
+  for (Eigen::Vector3f& x : mesh.positions) {
+    const int column = static_cast<int>(std::lround((x.x() + 12) * 10));
+    if (column % 2 != 0) x.z() += static_cast<float>(0.1 * slope);
+  }
+  return mesh;
+}
+
+TEST(EvaluationTest, NormalsAndRoughnessAreThoseOfTheTriangles) {
+  ThreadPool pool(2);
+  const TriangleMesh flat = Sheet(-12, 12, -9, 9, kDepth);
+  const auto same = Evaluate(flat, flat, Cameras(), {.pixel_stride = 1}, pool);
+  ASSERT_TRUE(same.ok()) << same.status();
+  EXPECT_NEAR(same->median_normal_error_deg, 0, 1e-3);
+  EXPECT_EQ(same->normals_within_10_deg, 1);
+  EXPECT_NEAR(same->roughness_deg, 0, 1e-3);
+  // Sides of 0.1, as wide as a pixel sees: the normal turns by twice the tilt from side to side.
+  const auto rough = Evaluate(Ridges(20, kDepth), flat, Cameras(), {.pixel_stride = 1}, pool);
+  ASSERT_TRUE(rough.ok()) << rough.status();
+  EXPECT_NEAR(rough->median_normal_error_deg, 20, 0.1);
+  EXPECT_EQ(rough->normals_within_10_deg, 0);
+  EXPECT_EQ(rough->normals_within_30_deg, 1);
+  EXPECT_NEAR(rough->roughness_deg, 40, 2);
+  EXPECT_NEAR(rough->ground_truth_roughness_deg, 0, 1e-3);
+  // The other way round: the truth is what is rough.
+  const auto smooth = Evaluate(flat, Ridges(20, kDepth), Cameras(), {.pixel_stride = 1}, pool);
+  ASSERT_TRUE(smooth.ok()) << smooth.status();
+  EXPECT_NEAR(smooth->roughness_deg, 0, 1e-3);
+  EXPECT_NEAR(smooth->ground_truth_roughness_deg, 40, 2);
+}
+
 }  // namespace
 }  // namespace meshwright

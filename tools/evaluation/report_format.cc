@@ -29,6 +29,11 @@ nlohmann::ordered_json ToJson(const EvaluationReport& report) {
           {"depth", ByThreshold(report.depth)},
           {"missing", report.missing},
           {"median_accuracy_g", report.median_accuracy_g},
+          {"median_normal_error_deg", report.median_normal_error_deg},
+          {"normals_within_10_deg", report.normals_within_10_deg},
+          {"normals_within_30_deg", report.normals_within_30_deg},
+          {"roughness_deg", report.roughness_deg},
+          {"ground_truth_roughness_deg", report.ground_truth_roughness_deg},
           {"accuracy_90", report.accuracy_90},
           {"completeness", report.completeness},
           {"completeness_distance", report.completeness_distance},
@@ -48,6 +53,10 @@ std::string ToText(const EvaluationReport& report) {
   text += Row("depth D", report.depth);
   text += absl::StrFormat("missing                 %6.4f of the ground-truth pixels\n", report.missing);
   text += absl::StrFormat("median accuracy         %6.4f g\n", report.median_accuracy_g);
+  text += absl::StrFormat("normals                 off by %.1f degrees (median); %.4f within 10, %.4f within 30\n",
+                          report.median_normal_error_deg, report.normals_within_10_deg, report.normals_within_30_deg);
+  text += absl::StrFormat("roughness               %.1f degrees from pixel to pixel, of the ground truth %.1f\n",
+                          report.roughness_deg, report.ground_truth_roughness_deg);
   text += absl::StrFormat("accuracy at 90 %%        %.6g scene units\n", report.accuracy_90);
   text += absl::StrFormat("completeness            %6.4f within %.6g scene units\n", report.completeness,
                           report.completeness_distance);

@@ -30,6 +30,7 @@ constexpr Recipe kRecipes[static_cast<int>(Material::kCount)] = {
     {0.27F, 0.25F, 0.22F, 0.22F, 1.05F, 1.0F, 0.08F},   // kGround
     {0.36F, 0.35F, 0.33F, 0.11F, 1.00F, 0.8F, 0.05F},   // kPaving
     {0.66F, 0.64F, 0.60F, 0.09F, 1.00F, 0.8F, 0.05F},   // kMarble
+    {0.40F, 0.06F, 0.05F, 0.010F, 0.50F, 1.5F, 0.01F},  // kLacquer
 };
 
 struct Block {
@@ -57,6 +58,8 @@ Block BlockAt(const Eigen::Vector2f& uv, float width, float height, float joint_
 }
 
 }  // namespace
+
+float Gloss(Material material) { return material == Material::kLacquer ? 0.25F : 0.0F; }
 
 Eigen::Vector3f Reflectance(Material material, const Eigen::Vector3f& x_in_world, const Eigen::Vector2f& uv_in_world,
                             float unit, float footprint_in_world, uint32_t salt) {

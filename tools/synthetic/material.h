@@ -21,8 +21,12 @@ enum class Material : uint8_t {
   kGround,       // gravel: strong fine texture
   kPaving,       // repetitive: square slabs
   kMarble,       // veins
+  kLacquer,      // untextured, with highlights that move with the camera
   kCount
 };
+
+// Share of the light that the surface mirrors as a highlight, 0..1; most materials are matt.
+float Gloss(Material material);
 
 // Diffuse reflectance (linear RGB, 0..1) at a surface point. `x`: world position, `uv`: position on the surface (both
 // in scene units), `unit`: scene units in which the material's own sizes (a brick, a vein) are metres, `footprint`:

@@ -13,6 +13,7 @@ struct SurfaceSample {
   Eigen::Vector3f x;
   Eigen::Vector3f normal;  // for shading, towards the camera
   Eigen::Vector3f reflectance;
+  float gloss = 0;
 };
 
 SurfaceSample Sample(const World& world, const RayHit& hit, const Eigen::Vector3d& x, float footprint, uint32_t salt) {
@@ -26,12 +27,30 @@ SurfaceSample Sample(const World& world, const RayHit& hit, const Eigen::Vector3
   const Eigen::Vector2f uv = w * world.uv[face[0]] + hit.u * world.uv[face[1]] + hit.v * world.uv[face[2]];
   sample.reflectance =
       Reflectance(world.material[static_cast<size_t>(hit.face)], sample.x, uv, world.unit, footprint, salt);
+  sample.gloss = Gloss(world.material[static_cast<size_t>(hit.face)]);
   return sample;
 }
 
 Eigen::Vector3f Sky(const World& world, const Eigen::Vector3d& direction) {
   const auto up = static_cast<float>(std::clamp(2.0 * direction.normalized().z(), 0.0, 1.0));
   return (1 - up) * world.sky_low + up * world.sky_high;
+}
+
+// Light of the lamps that a sample sends to the camera, linear: diffuse, and a highlight (Blinn and Phong).
+Eigen::Vector3f LampLight(const World& world, const SurfaceSample& sample, const Eigen::Vector3f& to_camera) {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (const Lamp& lamp : world.lamps) {
+    const Eigen::Vector3f offset = lamp.position - sample.x;
+    const float cosine = sample.normal.dot(offset.normalized());
+    if (cosine <= 0) continue;
+    const float irradiance = lamp.power * world.unit * world.unit / offset.squaredNorm();
+    sum += irradiance * cosine * sample.reflectance;
+    if (sample.gloss <= 0) continue;
+    float highlight = std::max(0.0F, sample.normal.dot((offset.normalized() + to_camera).normalized()));
+    for (int i = 0; i < 6; ++i) highlight *= highlight;  // to the 64th
+    sum += Eigen::Vector3f::Constant(4 * sample.gloss * irradiance * highlight);
+  }
+  return sum;
 }
 
 // Radiance of a pixel in linear RGB: the mean of four samples, one in each quarter.
@@ -74,6 +93,9 @@ Eigen::Vector3f PixelRadiance(const World& world, const MeshRayCaster& caster, c
     const float sun = (lit >> i & 1U) != 0 ? world.sun * samples[i].normal.dot(world.to_sun) : 0.0F;
     const float sky = world.ambient * (0.62F + 0.38F * samples[i].normal.z());
     sum += samples[i].reflectance.cwiseProduct(sun * sun_color + sky * sky_color);
+    if (!world.lamps.empty()) {
+      sum += LampLight(world, samples[i], -directions[i].normalized().cast<float>());
+    }
   }
   return 0.25F * sum;
 }
@@ -94,6 +116,8 @@ std::vector<ColorImage> TakePhotographs(const World& world, const MeshRayCaster&
     const Eigen::Vector3d center = camera.center_in_world();
     const Eigen::Matrix3d world_from_cam = camera.cam_from_world.rotation.transpose();
     const uint64_t camera_seed = HashBits(options.seed, 202, c);
+    const double ev = options.exposure_ev * (2 * UniformFromBits(HashBits(options.seed, 203, c)) - 1);
+    const auto exposure = static_cast<float>(std::exp2(ev));
     pool.ParallelFor(camera.height, 4, [&](int64_t begin, int64_t end) {
       for (int row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
         for (int column = 0; column < camera.width; ++column) {
@@ -101,7 +125,7 @@ std::vector<ColorImage> TakePhotographs(const World& world, const MeshRayCaster&
               static_cast<size_t>(row) * static_cast<size_t>(camera.width) + static_cast<size_t>(column);
           const uint64_t pixel_seed = HashBits(camera_seed, pixel);
           const Eigen::Vector3f radiance =
-              PixelRadiance(world, caster, camera, center, world_from_cam, column, row, pixel_seed, salt);
+              exposure * PixelRadiance(world, caster, camera, center, world_from_cam, column, row, pixel_seed, salt);
           for (size_t channel = 0; channel < 3; ++channel) {
             const double level = 255.0 * std::sqrt(std::max(0.0F, radiance[static_cast<Eigen::Index>(channel)]));
             const double noise = options.noise_sigma * NormalFromBits(HashBits(pixel_seed, 10 + channel));

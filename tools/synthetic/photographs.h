@@ -12,8 +12,9 @@
 
 namespace meshwright {
 
-// Photographs of the world: Lambertian surfaces under one sun with cast shadows and a sky, four jittered samples in a
-// pixel, sensor noise, gamma 2. `caster` is of world.mesh.
+// Photographs of the world: Lambertian surfaces under one sun with cast shadows, lamps and a sky, highlights of the
+// lamps on what is glossy, four jittered samples in a pixel, an exposure of its own for each photograph, sensor noise,
+// gamma 2, compression. `caster` is of world.mesh.
 std::vector<ColorImage> TakePhotographs(const World& world, const MeshRayCaster& caster,
                                         const std::vector<Camera>& cameras, const SyntheticOptions& options,
                                         ThreadPool& pool);

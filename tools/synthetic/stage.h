@@ -20,6 +20,7 @@ struct Stage {
 Stage BuildFacade(const SyntheticOptions& options);
 Stage BuildRing(const SyntheticOptions& options);
 Stage BuildStreet(const SyntheticOptions& options);
+Stage BuildRoom(const SyntheticOptions& options);
 
 // A camera of the options' size at `center` with the optical axis through `target`; world up (z) is up in the picture.
 Camera LookAt(const SyntheticOptions& options, double focal_px, const Eigen::Vector3d& center,

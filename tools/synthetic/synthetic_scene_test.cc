@@ -225,7 +225,53 @@ TEST_P(EverySyntheticKind, WhatIsWrittenReadsBack) {
 std::string KindName(const ::testing::TestParamInfo<SyntheticKind>& info) { return SyntheticKindName(info.param); }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, EverySyntheticKind,
-                         Values(SyntheticKind::kFacade, SyntheticKind::kRing, SyntheticKind::kStreet), KindName);
+                         Values(SyntheticKind::kFacade, SyntheticKind::kRing, SyntheticKind::kRoom,
+                                SyntheticKind::kStreet),
+                         KindName);
+
+// What ordinary photographs suffer: other exposures, compression, cameras that are a little off.
+TEST(SyntheticScenePhotographyTest, ExposureCompressionAndCameraNoiseAreAsAskedFor) {
+  SyntheticOptions options{.kind = SyntheticKind::kRoom, .cameras = 8, .width = 160, .height = 120, .noise_sigma = 0};
+  const SyntheticScene exact = Make(options);
+  options.exposure_ev = 0.5;
+  const SyntheticScene exposed = Make(options);
+  double least = 1e9;
+  double most = 0;
+  for (size_t i = 0; i < exact.images.size(); ++i) {
+    double before = 0;
+    double after = 0;
+    for (size_t k = 0; k < exact.images[i].rgb.size(); ++k) {
+      const double level = exact.images[i].rgb[k];
+      if (level < 20 || level > 140) continue;  // neither may be clipped
+      before += level * level;
+      after += static_cast<double>(exposed.images[i].rgb[k]) * exposed.images[i].rgb[k];
+    }
+    least = std::min(least, std::log2(after / before));
+    most = std::max(most, std::log2(after / before));
+  }
+  EXPECT_GT(least, -0.56);
+  EXPECT_LT(least, -0.1);
+  EXPECT_LT(most, 0.56);
+  EXPECT_GT(most, 0.1);
+
+  options.exposure_ev = 0;
+  options.jpeg_quality = 60;
+  options.camera_noise_px = 0.5;
+  const SyntheticScene off = Make(options);
+  double squares = 0;
+  for (size_t i = 0; i < off.cameras.size(); ++i) {
+    EXPECT_NE(off.images[i].rgb, exact.images[i].rgb);
+    EXPECT_EQ(off.cameras[i].cam_from_world.rotation, exact.cameras[i].cam_from_world.rotation);
+    Camera said = off.cameras[i];
+    said.cam_from_world = off.scene.views[i].cam_from_world;
+    EXPECT_TRUE(said.center_in_world().isApprox(off.cameras[i].center_in_world(), 1e-9));
+    const Eigen::Vector3d x = off.cameras[i].BackProject(80, 60, 3);
+    squares += (said.ProjectFromCam(said.CamFromWorld(x)) - Eigen::Vector2d(80, 60)).squaredNorm();
+  }
+  const double per_axis = std::sqrt(squares / (2.0 * static_cast<double>(off.cameras.size())));
+  EXPECT_GT(per_axis, 0.25);
+  EXPECT_LT(per_axis, 1.0);
+}
 
 TEST(SyntheticStreetTest, GrowsWithTheCamerasAndIsInNoOrder) {
   SyntheticOptions options{.kind = SyntheticKind::kStreet, .cameras = 20, .width = 64, .height = 64};
@@ -249,7 +295,7 @@ TEST(SyntheticOptionsTest, NamesTheFieldThatIsOutOfRange) {
   EXPECT_THAT(SyntheticOptions{.noise_sigma = std::nan("")}.Validate().ToString(), HasSubstr("noise_sigma"));
   EXPECT_TRUE((SyntheticOptions{.kind = SyntheticKind::kRing, .cameras = 200}).Validate().ok());
   EXPECT_THAT(ParseSyntheticKind("castle").status().ToString(), HasSubstr("\"castle\""));
-  for (const auto kind : {SyntheticKind::kFacade, SyntheticKind::kRing, SyntheticKind::kStreet}) {
+  for (const auto kind : {SyntheticKind::kFacade, SyntheticKind::kRing, SyntheticKind::kRoom, SyntheticKind::kStreet}) {
     EXPECT_EQ(*ParseSyntheticKind(SyntheticKindName(kind)), kind);
   }
 }

@@ -12,14 +12,21 @@
 
 namespace meshwright {
 
+// A small bright lamp; it casts no shadows.
+struct Lamp {
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // scene units
+  float power = 1;                                     // irradiance of a surface that faces it at a distance of `unit`
+};
+
 // A synthetic world: exact geometry with what it is made of and how it is lit.
 struct World {
-  TriangleMesh mesh;                                   // positions, normals (for shading), faces
-  std::vector<Eigen::Vector2f> uv;                     // per vertex; position on the surface, scene units
-  std::vector<Material> material;                      // per face
-  float unit = 1;                                      // scene units in which the materials' sizes are metres
-  Eigen::Vector3f to_sun = Eigen::Vector3f::UnitZ();   // unit
-  float sun = 1;                                       // irradiance of a surface across the sun's rays
+  TriangleMesh mesh;                                  // positions, normals (for shading), faces
+  std::vector<Eigen::Vector2f> uv;                    // per vertex; position on the surface, scene units
+  std::vector<Material> material;                     // per face
+  float unit = 1;                                     // scene units in which the materials' sizes are metres
+  Eigen::Vector3f to_sun = Eigen::Vector3f::UnitZ();  // unit
+  float sun = 1;                                      // irradiance of a surface across the sun's rays
+  std::vector<Lamp> lamps;
   float ambient = 0.3F;                                // irradiance from the sky
   Eigen::Vector3f sky_low = Eigen::Vector3f::Zero();   // background at the horizon, linear RGB
   Eigen::Vector3f sky_high = Eigen::Vector3f::Zero();  // background at the zenith
