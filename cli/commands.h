@@ -6,6 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <absl/status/statusor.h>
 
+#include "pipeline/texturing/texture_options.h"
+
 #include "common/program/console.h"
 #include "common/scene/formats/import_options.h"
 #include "common/scene/scene.h"
@@ -21,9 +23,11 @@ void AddInspectCommand(CLI::App& program, Run& run);
 void AddToolCommands(CLI::App& program, Run& run);
 void AddEvaluateCommand(CLI::App& program, Run& run);
 void AddSynthesizeCommand(CLI::App& program, Run& run);
+void AddConvertCommand(CLI::App& program, Run& run);
 void AddRenderCommand(CLI::App& program, Run& run);
 void AddSubmitCommand(CLI::App& program, Run& run);
 void AddOptionsCommand(CLI::App& program, Run& run);
+void AddTextureCommand(CLI::App& program, Run& run);
 void AddUpCommand(CLI::App& program, Run& run);
 // status, watch, fetch, cancel, delete, workers.
 void AddServiceCommands(CLI::App& program, Run& run);
@@ -36,6 +40,8 @@ struct SceneArguments {
 // --format, --model and --images.
 void AddSceneOptions(CLI::App& command, SceneArguments& scene);
 void AddOutputOptions(CLI::App& command, OutputSettings& output);
+// --texture-error and what else an atlas depends on.
+void AddTextureOptions(CLI::App& command, TextureOptions& options);
 void AddThreadsOption(CLI::App& command, int& threads);
 
 // Cores that this process may use.

@@ -24,6 +24,8 @@ int main(int argc, char** argv) {
   Run run;
   AddReconstructCommand(program, run);
   AddInspectCommand(program, run);
+  AddConvertCommand(program, run);
+  AddTextureCommand(program, run);
   AddToolCommands(program, run);
   AddOptionsCommand(program, run);
   AddUpCommand(program, run);

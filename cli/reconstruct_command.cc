@@ -13,12 +13,14 @@
 #include "cli/loss_follower.h"
 #include "cli/progress_display.h"
 #include "common/base/clock.h"
+#include "common/mesh/formats/mesh_format.h"
 
 namespace meshwright {
 namespace {
 
 constexpr char kExamples[] = R"(Examples:
   meshwright reconstruct scene -o mesh.ply
+  meshwright reconstruct scene -o model.glb                    # simplified, with a texture
   meshwright reconstruct fountain-P11 -o fountain.ply --max-image-size 1536
   meshwright reconstruct temple -o temple.ply --lattice-step 1 --support 2 --parts
 Stopped or killed, the same command goes on from the last camera and ends with the same bytes.)";
@@ -27,6 +29,8 @@ struct Arguments {
   SceneArguments scene;
   ReconstructionOptions options;
   LocalSettings settings;
+  TextureOptions texture;
+  bool no_texture = false;
   bool parts = false;
   int64_t memory_mib = 0;    // 0: by the number of threads
   std::string ground_truth;  // PLY; "": none
@@ -69,6 +73,18 @@ int Reconstruct(Arguments& arguments) {
   LocalSettings& settings = arguments.settings;
   if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
     return FailWrongUse(std::string(valid.message()));
+  }
+  const absl::StatusOr<const MeshFormat*> format = MeshFormatOfPath(settings.output_path);
+  if (!format.ok()) return FailWrongUse(std::string(format.status().message()));
+  if (!arguments.ground_truth.empty() && !IsPly(**format)) {
+    return FailWrongUse(absl::StrCat("-o is ", settings.output_path, ", expected a .ply with --ground-truth"));
+  }
+  if (const absl::Status valid = arguments.texture.Validate(); !valid.ok()) {
+    return FailWrongUse(std::string(valid.message()));
+  }
+  if (!arguments.no_texture) {
+    settings.texture = arguments.texture;
+    settings.texture->max_image_size = arguments.options.max_image_size;
   }
   settings.report_path = BesideOutput(settings.output_path, ".report.json");
   if (settings.work_folder.empty()) settings.work_folder = settings.output_path + ".work";
@@ -120,8 +136,14 @@ void AddReconstructCommand(CLI::App& program, Run& run) {
   CLI::App& command = *program.add_subcommand("reconstruct", "Turn photographs with known cameras into a mesh");
   command.footer(kExamples);
   command.add_option("SCENE", arguments->scene.path, "folder with cameras and photographs")->required();
-  command.add_option("-o,--output", arguments->settings.output_path, "the mesh to write, PLY")->required();
+  command
+      .add_option("-o,--output", arguments->settings.output_path,
+                  absl::StrCat("the mesh to write; its ending says the format: ", MeshFormatEndings()))
+      ->required();
   AddSceneOptions(command, arguments->scene);
+  command.add_flag("--no-texture", arguments->no_texture,
+                   "GLB and OBJ with the whole mesh and colours at its vertices, not simplified with a texture");
+  AddTextureOptions(command, arguments->texture);
   command.add_flag("--parts", arguments->parts, "also write one PLY per reference camera, into OUTPUT.parts/");
   command.add_option("--work-dir", arguments->settings.work_folder,
                      "state and surfaces while it runs [OUTPUT.ply.work]; removed at the end");

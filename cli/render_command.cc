@@ -1,9 +1,14 @@
+#include <cstdio>
 #include <map>
 #include <memory>
+#include <optional>
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
 #include "tools/rendering/mesh_renderer.h"
+#include "tools/rendering/picture_comparison.h"
+#include "tools/rendering/textured_model.h"
 
 #include "cli/commands.h"
 #include "common/base/bad_input.h"
@@ -31,6 +36,7 @@ struct Arguments {
   int max_image_size = 1024;
   Shading shading = Shading::kColors;
   std::string picture;
+  bool compare = false;
   int threads = AvailableCores();
 };
 
@@ -43,21 +49,76 @@ absl::StatusOr<Camera> FindCamera(const Scene& scene, const Arguments& arguments
                                        scene.views.size(), " is \"", scene.views.front().name, "\"")));
 }
 
+// What is drawn: a mesh or point cloud with colours at its vertices, or a model with a texture atlas.
+class Drawing {
+ public:
+  static absl::StatusOr<std::unique_ptr<Drawing>> Read(const std::string& path) {
+    auto drawing = std::make_unique<Drawing>();
+    if (absl::EndsWithIgnoreCase(path, ".glb")) {
+      MW_ASSIGN_OR_RETURN(drawing->model_, ReadTexturedGlb(path));
+      drawing->textured_.emplace(drawing->model_);
+    } else {
+      MW_ASSIGN_OR_RETURN(drawing->model_.mesh, ReadPly(path));
+    }
+    drawing->colored_.emplace(drawing->model_.mesh);
+    return drawing;
+  }
+
+  ColorImage Render(const Camera& camera, Shading shading, ThreadPool& pool) const {
+    const RenderOptions options = {.shading = shading};
+    if (textured_.has_value() && shading == Shading::kColors) {
+      return textured_->Render(camera, options.background, pool);
+    }
+    return colored_->Render(camera, options, pool);
+  }
+
+  const MeshRenderer& colored() const { return *colored_; }
+  const TexturedModel* textured() const { return textured_.has_value() ? &model_ : nullptr; }
+
+ private:
+  TexturedModel model_;
+  std::optional<MeshRenderer> colored_;
+  std::optional<TexturedModelRenderer> textured_;
+};
+
+absl::Status Compare(const Arguments& arguments, const Scene& scene, const Drawing& drawing, const Camera& camera,
+                     const ColorImage& picture, ThreadPool& pool) {
+  for (const SceneView& view : scene.views) {
+    if (view.name != arguments.camera) continue;
+    MW_ASSIGN_OR_RETURN(const View photograph, LoadView(view, arguments.max_image_size));
+    const PictureComparison comparison =
+        CompareWhereCovered(picture, photograph.color, drawing.colored().caster(), camera, pool);
+    std::printf("%.2f dB PSNR over the %.1f%% of the photograph that are covered\n", comparison.psnr_db,
+                100 * comparison.share);
+    if (drawing.textured() != nullptr) {
+      const EdgeJumps jumps = MeasureEdgeJumps(*drawing.textured());
+      std::printf("%.2f grey levels across %s edges between pieces of photographs, %.2f across others\n",
+                  jumps.at_seams, FormatCount(jumps.seams).c_str(), jumps.within_charts);
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::Status RenderMesh(const Arguments& arguments) {
   ThreadPool pool(arguments.threads);
   MW_ASSIGN_OR_RETURN(const Scene scene, LoadScene(arguments.scene));
   MW_ASSIGN_OR_RETURN(Camera camera, FindCamera(scene, arguments));
-  const absl::StatusOr<TriangleMesh> mesh = ReadPly(arguments.mesh);
-  if (!mesh.ok()) return BadInput(mesh.status());
-  const MeshRenderer renderer(*mesh);
+  const absl::StatusOr<std::unique_ptr<Drawing>> drawing = Drawing::Read(arguments.mesh);
+  if (!drawing.ok()) return BadInput(drawing.status());
   if (arguments.orbit_deg != 0 || arguments.pitch_deg != 0) {
-    camera = OrbitCamera(camera, renderer.Pivot(camera, pool), arguments.orbit_deg * kRadiansPerDegree,
+    camera = OrbitCamera(camera, (*drawing)->colored().Pivot(camera, pool), arguments.orbit_deg * kRadiansPerDegree,
                          arguments.pitch_deg * kRadiansPerDegree);
   }
-  return WritePng(arguments.picture, renderer.Render(camera, {.shading = arguments.shading}, pool));
+  const ColorImage picture = (*drawing)->Render(camera, arguments.shading, pool);
+  if (arguments.compare) MW_RETURN_IF_ERROR(Compare(arguments, scene, **drawing, camera, picture, pool));
+  return WritePng(arguments.picture, picture);
 }
 
 int RunCommand(const Arguments& arguments) {
+  if (arguments.compare && (arguments.orbit_deg != 0 || arguments.pitch_deg != 0)) {
+    return FailWrongUse(
+        "--compare is given, expected no --orbit-deg and no --pitch-deg: there is no photograph from there");
+  }
   const absl::Status status = RenderMesh(arguments);
   return status.ok() ? kExitDone : Fail(status);
 }
@@ -68,7 +129,7 @@ void AddRenderCommand(CLI::App& program, Run& run) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("render", "Make a picture of a mesh as one of the cameras sees it");
   command.footer(kExamples);
-  command.add_option("MESH", arguments->mesh, "mesh or point cloud, PLY")->required();
+  command.add_option("MESH", arguments->mesh, "mesh or point cloud, PLY; or a model with a texture, GLB")->required();
   command.add_option("--scene", arguments->scene.path, "folder with the cameras")->required();
   AddSceneOptions(command, arguments->scene);
   command.add_option("--camera", arguments->camera, "name of the photograph whose camera looks")->required();
@@ -86,6 +147,7 @@ void AddRenderCommand(CLI::App& program, Run& run) {
           CLI::ignore_case))
       ->type_name("SHADING")
       ->default_str("colors");
+  command.add_flag("--compare", arguments->compare, "print how far the picture is from the photograph");
   AddThreadsOption(command, arguments->threads);
   command.callback([arguments, &run] { run = [arguments] { return RunCommand(*arguments); }; });
 }

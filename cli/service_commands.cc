@@ -9,7 +9,9 @@
 #include <absl/time/time.h>
 
 #include "cli/commands.h"
+#include "cli/mesh_output.h"
 #include "cli/service_arguments.h"
+#include "common/mesh/formats/mesh_format.h"
 
 namespace meshwright {
 namespace {
@@ -89,7 +91,10 @@ int ShowWorkers(const Arguments& arguments) {
 }
 
 int Fetch(const Arguments& arguments) {
-  const absl::Status status = arguments.service.Connect()->Fetch(arguments.id, arguments.output_path);
+  if (const auto format = MeshFormatOfPath(arguments.output_path); !format.ok()) {
+    return FailWrongUse(std::string(format.status().message()));
+  }
+  const absl::Status status = FetchMesh(*arguments.service.Connect(), arguments.id, arguments.output_path);
   if (!status.ok()) return Fail(status);
   if (arguments.service.output.json) {
     PrintJson({{"id", arguments.id}, {"mesh", arguments.output_path}});
@@ -179,7 +184,10 @@ void AddServiceCommands(CLI::App& program, Run& run) {
               });
   const auto fetch = add_with_id("fetch", "Download the mesh of a submitted reconstruction",
                                  "meshwright fetch my-scene -o mesh.ply", Fetch);
-  fetch.first->add_option("-o,--output", fetch.second->output_path, "the mesh to write, PLY")->required();
+  fetch.first
+      ->add_option("-o,--output", fetch.second->output_path,
+                   absl::StrCat("the mesh to write; its ending says the format: ", MeshFormatEndings()))
+      ->required();
   add_with_id("cancel", "Stop a submitted reconstruction", "meshwright cancel my-scene",
               [](const Arguments& arguments) {
                 return Show(arguments.service.Connect()->Cancel(arguments.id), arguments.service.output);

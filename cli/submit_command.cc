@@ -13,8 +13,10 @@
 #include "pipeline/options/reconstruction_options.h"
 
 #include "cli/commands.h"
+#include "cli/mesh_output.h"
 #include "cli/service_arguments.h"
 #include "common/base/status_macros.h"
+#include "common/mesh/formats/mesh_format.h"
 
 namespace meshwright {
 namespace {
@@ -86,6 +88,11 @@ int Submit(Arguments& arguments) {
   if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
     return FailWrongUse(std::string(valid.message()));
   }
+  if (!arguments.output_path.empty()) {
+    if (const auto format = MeshFormatOfPath(arguments.output_path); !format.ok()) {
+      return FailWrongUse(std::string(format.status().message()));
+    }
+  }
   const bool by_reference = absl::StartsWith(arguments.scene.path, kByReference);
   if (!by_reference) {
     // Better known here and now than after it was uploaded.
@@ -116,7 +123,7 @@ int Submit(Arguments& arguments) {
   }
   const int ended = WatchUntilOver(*client, arguments.id, arguments.service.output);
   if (ended != kExitDone || arguments.output_path.empty()) return ended;
-  const absl::Status fetched = client->Fetch(arguments.id, arguments.output_path);
+  const absl::Status fetched = FetchMesh(*client, arguments.id, arguments.output_path);
   return fetched.ok() ? kExitDone : Fail(fetched);
 }
 
@@ -138,7 +145,8 @@ void AddSubmitCommand(CLI::App& program, Run& run) {
       ->check(CLI::Range(0.001, 1000.0))
       ->capture_default_str();
   command.add_flag("--wait", arguments->wait, "until it is over");
-  command.add_option("-o,--output", arguments->output_path, "wait and write the mesh, PLY");
+  command.add_option("-o,--output", arguments->output_path,
+                     absl::StrCat("wait and write the mesh; its ending says the format: ", MeshFormatEndings()));
   AddServiceOptions(command, arguments->service);
   VisitOptions(arguments->options, [&](const char* group, const char* name, auto& field, const char* help) {
     command.add_option(absl::StrCat("--", name), field, help)->group(group)->capture_default_str();

@@ -1,11 +1,13 @@
+#include <filesystem>
 #include <limits>
+#include <system_error>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
 
 #include "common/base/digest.h"
 #include "common/base/status_macros.h"
-#include "common/mesh/glb.h"
+#include "common/mesh/formats/mesh_format.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/surface_mesh.h"
 #include "common/surface/codec.h"
@@ -21,8 +23,6 @@ constexpr int64_t kMaxSequence = std::numeric_limits<SequenceNumber>::max();
 constexpr char kPlyType[] = "model/ply";
 constexpr int64_t kDefaultPreviewFaces = 20'000;
 constexpr int64_t kMaxPreviewFaces = 4'000'000;
-// A conversion takes several times as much memory.
-constexpr int64_t kMaxGlbSourceBytes = int64_t{1} << 30;
 
 absl::StatusOr<v1::Part> FindPart(const RestContext& context, const RestCall& call) {
   MW_ASSIGN_OR_RETURN(const int64_t sequence, PathNumber(call, "sequence", 1, kMaxSequence));
@@ -73,44 +73,68 @@ absl::Status WriteUnion(const v1::ListPartsResponse& parts, BlobStore& blobs, co
   return writer.Commit();
 }
 
+// Answers with `ply` in the format. `key`: names the PLY's bytes; `name`: what a browser saves it as, without ending.
+absl::Status SendAs(const RestContext& context, RestCall& call, const MeshFormat& format, const std::string& ply_path,
+                    const std::string& key, const std::string& name) {
+  const std::string derived_key = absl::StrCat(format.name, "-", key);
+  MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(derived_key, [&](const std::string& path) {
+    return ConvertPly(ply_path, format, false, path);
+  }));
+  return SendFile(call, std::move(file), derived_key, format.media_type, absl::StrCat(name, format.ending));
+}
+
 // The parts accepted so far, side by side.
-absl::Status SendPartialMesh(const RestContext& context, RestCall& call) {
+absl::Status SendPartialMesh(const RestContext& context, RestCall& call, const MeshFormat& format) {
   const std::string& id = call.path.at("id");
   MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts, context.reconstructions->ListParts(id));
   std::string digests;
   for (const v1::Part& part : parts.parts()) digests += part.sha256();
-  const std::string key = absl::StrCat("union-", Sha256Hex(digests));
-  MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& to) {
-    return WriteUnion(parts, *context.blobs, to);
+  const std::string key = absl::StrCat("union-", format.name, "-", Sha256Hex(digests));
+  MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& to) -> absl::Status {
+    if (IsPly(format)) return WriteUnion(parts, *context.blobs, to);
+    const std::string ply = to + ".ply";
+    absl::Status written = WriteUnion(parts, *context.blobs, ply);
+    if (written.ok()) written = ConvertPly(ply, format, false, to);
+    std::error_code error;
+    std::filesystem::remove(ply, error);
+    return written;
   }));
-  return SendFile(call, std::move(file), key, kPlyType, absl::StrCat(id, "-partial.ply"));
+  return SendFile(call, std::move(file), key, format.media_type, absl::StrCat(id, "-partial", format.ending));
+}
+
+absl::StatusOr<const MeshFormat*> QueryFormat(const RestCall& call) {
+  constexpr char kName[] = "format";
+  if (!call.request.has_param(kName)) return &MeshFormats().front();
+  absl::StatusOr<const MeshFormat*> format = MeshFormatByName(call.request.get_param_value(kName));
+  if (!format.ok()) return FieldError(kName, format.status());
+  return format;
+}
+
+absl::Status SendMesh(const RestContext& context, RestCall& call, const MeshFormat& format, bool partial) {
+  const std::string& id = call.path.at("id");
+  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, context.reconstructions->Get(id));
+  if (partial && reconstruction.state() != v1::RECONSTRUCTION_STATE_DONE) return SendPartialMesh(context, call, format);
+  MW_ASSIGN_OR_RETURN(const std::string path, context.reconstructions->MeshPath(id));
+  if (!IsPly(format)) return SendAs(context, call, format, path, reconstruction.mesh_sha256(), id);
+  MW_ASSIGN_OR_RETURN(auto file, OpenedFile::Open(path));
+  return SendFile(call, std::move(file), reconstruction.mesh_sha256(), format.media_type,
+                  absl::StrCat(id, format.ending));
 }
 
 absl::Status DownloadMesh(const RestContext& context, RestCall& call) {
-  const std::string& id = call.path.at("id");
   MW_ASSIGN_OR_RETURN(const bool partial, QueryFlag(call, "partial"));
-  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, context.reconstructions->Get(id));
-  if (partial && reconstruction.state() != v1::RECONSTRUCTION_STATE_DONE) return SendPartialMesh(context, call);
-  MW_ASSIGN_OR_RETURN(const std::string path, context.reconstructions->MeshPath(id));
-  MW_ASSIGN_OR_RETURN(auto file, OpenedFile::Open(path));
-  return SendFile(call, std::move(file), reconstruction.mesh_sha256(), kPlyType, absl::StrCat(id, ".ply"));
+  MW_ASSIGN_OR_RETURN(const MeshFormat* format, QueryFormat(call));
+  return SendMesh(context, call, *format, partial);
 }
 
 absl::Status DownloadGlb(const RestContext& context, RestCall& call) {
-  const std::string& id = call.path.at("id");
-  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, context.reconstructions->Get(id));
-  MW_ASSIGN_OR_RETURN(const std::string mesh_path, context.reconstructions->MeshPath(id));
-  if (reconstruction.mesh_bytes() > kMaxGlbSourceBytes) {
-    return HttpError(413, absl::ResourceExhaustedError(absl::StrCat("the mesh has ", reconstruction.mesh_bytes(),
-                                                                    " bytes, converted are up to ", kMaxGlbSourceBytes,
-                                                                    "; download the PLY")));
-  }
-  const std::string key = absl::StrCat("glb-", reconstruction.mesh_sha256());
-  MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& path) -> absl::Status {
-    MW_ASSIGN_OR_RETURN(const TriangleMesh mesh, ReadPly(mesh_path));
-    return WriteGlb(mesh, path);
-  }));
-  return SendFile(call, std::move(file), key, "model/gltf-binary", absl::StrCat(id, ".glb"));
+  MW_ASSIGN_OR_RETURN(const MeshFormat* format, MeshFormatByName("glb"));
+  return SendMesh(context, call, *format, false);
+}
+
+absl::Status ListFormats(const RestContext& context, RestCall& call) {
+  call.response.set_content(DescribeMeshFormats(), kJsonType);
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -123,8 +147,9 @@ void AddResultRoutes(const RestContext& context, std::vector<Route>& routes) {
   add("/v1/reconstructions/{id}/parts", {"after"}, ListParts);
   add("/v1/reconstructions/{id}/parts/{sequence}", {}, DownloadPart);
   add("/v1/reconstructions/{id}/parts/{sequence}/preview", {"max_faces"}, PreviewPart);
-  add("/v1/reconstructions/{id}/mesh", {"partial"}, DownloadMesh);
+  add("/v1/reconstructions/{id}/mesh", {"partial", "format"}, DownloadMesh);
   add("/v1/reconstructions/{id}/mesh.glb", {}, DownloadGlb);
+  add("/v1/formats", {}, ListFormats);
 }
 
 }  // namespace meshwright

@@ -13,12 +13,14 @@
 
 #include "pipeline/local/report.h"
 #include "pipeline/local/work_folder.h"
+#include "pipeline/texturing/texture_mesh.h"
 
 #include "common/base/bad_input.h"
 #include "common/base/clock.h"
 #include "common/base/files.h"
 #include "common/base/process_usage.h"
 #include "common/base/status_macros.h"
+#include "common/mesh/formats/mesh_format.h"
 #include "common/mesh/surface_mesh.h"
 #include "common/scene/scene_check.h"
 #include "common/scene/view.h"
@@ -128,6 +130,7 @@ class LocalReconstruction {
 
   absl::StatusOr<Json> Run() {
     MW_RETURN_IF_ERROR(options_.Validate());
+    MW_ASSIGN_OR_RETURN(format_, MeshFormatOfPath(settings_.output_path));
     for (const std::string& path : {settings_.output_path, settings_.report_path}) {
       MW_RETURN_IF_ERROR(CheckIsNoPhotograph(scene_, path));
       MW_RETURN_IF_ERROR(CheckWritable(path));
@@ -235,17 +238,37 @@ class LocalReconstruction {
     const auto count = static_cast<int>(surfaces.size());
     int loaded = 0;  // each at least twice
     const auto loading = [&] { Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count); };
-    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts, WriteAcceptedMesh(surfaces, work_->blobs(), options_.join,
-                                                                         settings_.output_path, pool_, loading));
+    const std::string ply_path = IsPly(*format_) ? settings_.output_path : settings_.work_folder + "/mesh.ply";
+    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts,
+                        WriteAcceptedMesh(surfaces, work_->blobs(), options_.join, ply_path, pool_, loading));
     if (counts.faces == 0) {
       std::error_code error;
-      fs::remove(settings_.output_path, error);
+      fs::remove(ply_path, error);
       return absl::FailedPreconditionError(DescribeNothing(totals_, options_));
     }
-    Json report = MakeReport(counts, std::move(cameras));
-    MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, report.dump(2) + "\n"));
     Tell(LocalStage::kJoining, count, count);
+    Json texture;
+    if (!IsPly(*format_)) {
+      MW_ASSIGN_OR_RETURN(texture, WriteInFormat(ply_path));
+    }
+    Json report = MakeReport(counts, std::move(cameras));
+    if (!texture.is_null()) report["texture"] = std::move(texture);
+    MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, report.dump(2) + "\n"));
     return report;
+  }
+
+  // What is to be told of the texture; null when there is none.
+  absl::StatusOr<Json> WriteInFormat(const std::string& ply_path) {
+    if (!format_->textured || !settings_.texture.has_value()) {
+      MW_RETURN_IF_ERROR(ConvertPly(ply_path, *format_, false, settings_.output_path));
+      return Json();
+    }
+    MW_ASSIGN_OR_RETURN(TriangleMesh mesh, ReadPly(ply_path));
+    const auto progress = [&](int done, int total) { Tell(LocalStage::kTexturing, done, total); };
+    MW_ASSIGN_OR_RETURN(const TextureReport report,
+                        WriteTexturedMesh(std::move(mesh), scene_, *settings_.texture, *format_, settings_.output_path,
+                                          pool_, progress));
+    return ToJson(report);
   }
 
   Json MakeReport(const JoinedMeshCounts& counts, Json cameras) const {
@@ -290,6 +313,7 @@ class LocalReconstruction {
   RealClock clock_;
   ThreadPool pool_{settings_.threads};
   std::vector<FileStamp> stamps_;  // of the photographs, before they were digested
+  const MeshFormat* format_ = nullptr;
   std::vector<Camera> cameras_;
   std::unique_ptr<WorkFolder> work_;
   std::unique_ptr<Conductor> conductor_;
@@ -309,6 +333,8 @@ std::string NameOf(LocalStage stage) {
       return "cameras";
     case LocalStage::kJoining:
       return "joining the mesh";
+    case LocalStage::kTexturing:
+      return "cutting textures";
   }
   return "";
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include <absl/status/statusor.h>
@@ -10,6 +11,7 @@
 #include "pipeline/local/job_runner.h"
 #include "pipeline/local/local_progress.h"
 #include "pipeline/options/reconstruction_options.h"
+#include "pipeline/texturing/texture_options.h"
 
 #include "common/scene/scene.h"
 #include "common/surface/patch_lattice.h"
@@ -18,7 +20,10 @@ namespace meshwright {
 
 // Where a reconstruction's files go and what it may use. Nothing here changes the mesh.
 struct LocalSettings {
-  std::string output_path;               // the mesh, PLY
+  std::string output_path;  // the mesh, in the format that its ending says
+  // Of a format that carries one: the mesh is simplified and gets its colours from an atlas. None: all of the mesh,
+  // with colours at its vertices.
+  std::optional<TextureOptions> texture;
   std::string report_path;               // report.json
   std::string parts_folder;              // one PLY per reference camera; "": none
   std::string work_folder;               // state and surfaces

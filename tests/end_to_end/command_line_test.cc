@@ -12,7 +12,7 @@ namespace meshwright::end_to_end {
 namespace {
 
 TEST(CommandLineTest, EveryCommandHasHelpWithExamples) {
-  for (const std::string command : {"reconstruct", "inspect", "evaluate", "synthesize", "render"}) {
+  for (const std::string command : {"reconstruct", "inspect", "evaluate", "synthesize", "render", "convert"}) {
     const RunResult result = RunMeshwright({command, "--help"});
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_THAT(result.out, testing::HasSubstr("Examples:\n  meshwright " + command));
@@ -33,6 +33,10 @@ TEST(CommandLineTest, WrongUseIsTwo) {
       {"reconstruct"},
       {"reconstruct", "scene"},
       {"reconstruct", "scene", "-o", "x.ply", "--nonsense"},
+      {"reconstruct", "scene", "-o", "x.docx"},
+      {"reconstruct", "scene", "-o", "x"},
+      {"convert", "x.ply", "-o", "x.docx"},
+      {"fetch", "id", "-o", "x.docx"},
       {"reconstruct", "scene", "-o", "x.ply", "--threads", "0"},
       {"reconstruct", "scene", "-o", "x.ply", "--threads", "many"},
       {"reconstruct", "scene", "-o", "x.ply", "--window", "0"},

@@ -155,6 +155,7 @@ TEST_F(MalformedCallsTest, OverHttp) {
       {"GET", there + "/parts/1/preview?max_faces=0", "", 400, "max_faces", "1.."},
       {"GET", there + "/mesh", "", 409, "", "one that is done"},
       {"GET", there + "/mesh?partial=yes", "", 400, "partial", "true or false"},
+      {"GET", there + "/mesh?format=docx", "", 400, "format", "ply, glb"},
       {"GET", there + "/mesh.glb", "", 409, "", "one that is done"},
   };
   for (const Case& c : cases) {

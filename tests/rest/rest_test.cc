@@ -134,6 +134,14 @@ TEST_F(RestTest, FromAnInterruptedUploadToTheMesh) {
   const auto head = http_->Head(base + "/mesh");
   EXPECT_EQ(head->get_header_value("Content-Length"), std::to_string(mesh->body.size()));
   EXPECT_THAT(http_->Get(base + "/mesh.glb")->body, StartsWith("glTF"));
+  const Json formats = GetJson("/v1/formats")["formats"];
+  ASSERT_GE(formats.size(), 5U);
+  for (const Json& format : formats) {
+    const auto converted = http_->Get(base + "/mesh?format=" + format["name"].get<std::string>());
+    EXPECT_EQ(converted->status, 200) << format;
+    EXPECT_EQ(converted->get_header_value("Content-Type"), format["mediaType"]);
+    EXPECT_EQ(converted->body == mesh->body, format["name"] == "ply");
+  }
 
   // One part: as PLY with all of its faces, and as a preview with few.
   const std::string part = absl::StrCat(base, "/parts/", parts[0]["sequence"].get<int>());

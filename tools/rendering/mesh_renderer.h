@@ -35,6 +35,8 @@ class MeshRenderer {
   // Four samples a pixel. The same picture whatever the number of threads.
   ColorImage Render(const Camera& camera, const RenderOptions& options, ThreadPool& pool) const;
 
+  const MeshRayCaster& caster() const { return caster_; }
+
   // The point on the camera's optical axis at the median depth of what it sees; of the vertices before it when the
   // camera's rays meet nothing; one unit in front when there are none. A pivot for OrbitCamera.
   Eigen::Vector3d Pivot(const Camera& camera, ThreadPool& pool) const;

@@ -1,5 +1,5 @@
 import { signal } from '@preact/signals';
-import type { LogEntry, Option, Problem, Reconstruction, SceneFile, Worker } from './types';
+import type { Format, LogEntry, Option, Problem, Reconstruction, SceneFile, Worker } from './types';
 
 // The API lies beside the page, below whatever path a proxy puts both.
 export function apiUrl(path: string): string {
@@ -89,5 +89,6 @@ export const api = {
   files: async (id: string) => (await getJson<{ files?: SceneFile[] }>(`${at(id)}/files`)).files ?? [],
   workers: async () => (await getJson<{ workers?: Worker[] }>('workers')).workers ?? [],
   drain: async (worker: string) => void (await call(`workers/${encodeURIComponent(worker)}:drain`, { method: 'POST' })),
+  formats: async () => (await getJson<{ formats?: Format[] }>('formats')).formats ?? [],
   options: async () => (await getJson<{ options?: Option[] }>('options')).options ?? [],
 };

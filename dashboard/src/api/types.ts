@@ -115,6 +115,13 @@ export interface Option {
   documentation: string;
 }
 
+export interface Format {
+  name: string;
+  ending: string;
+  title: string;
+  note: string;
+}
+
 export interface SceneFile {
   path: string;
   sizeBytes: string;

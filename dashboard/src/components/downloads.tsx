@@ -1,5 +1,6 @@
-import { useRef } from 'preact/hooks';
-import { stateOf, type Reconstruction } from '../api/types';
+import { useRef, useState } from 'preact/hooks';
+import { api } from '../api/client';
+import { stateOf, type Format, type Reconstruction } from '../api/types';
 import { bytes } from '../format';
 
 interface Props {
@@ -11,6 +12,14 @@ interface Props {
 export function Downloads({ base, reconstruction, hasParts }: Props) {
   const details = useRef<HTMLDetailsElement>(null);
   const done = stateOf(reconstruction) === 'DONE';
+  // As the coordinator's programs write them; asked for when the menu opens.
+  const [formats, setFormats] = useState<Format[]>([]);
+  const [failure, setFailure] = useState('');
+  const onToggle = () => {
+    if (details.current?.open && formats.length === 0) {
+      api.formats().then(setFormats, (error: Error) => setFailure(`Formats cannot be shown: ${error.message}`));
+    }
+  };
   const close = () => details.current?.removeAttribute('open');
   const onKeyDown = (event: KeyboardEvent) => {
     if (event.key !== 'Escape' || !details.current?.open) return;
@@ -28,17 +37,19 @@ export function Downloads({ base, reconstruction, hasParts }: Props) {
   );
   const { id } = reconstruction;
   return (
-    <details class="menu" ref={details} onKeyDown={onKeyDown}>
+    <details class="menu" ref={details} onKeyDown={onKeyDown} onToggle={onToggle}>
       <summary class={done ? 'button primary' : 'button'}>Download</summary>
       <ul>
+        {failure !== '' && <li class="muted small">{failure}</li>}
         {done &&
-          link(
-            `${base}/mesh`,
-            `${id}.ply`,
-            'Mesh, PLY',
-            `${bytes(Number(reconstruction.meshBytes ?? 0))}, all attributes`,
+          formats.map(({ name, ending, title, note }) =>
+            link(
+              name === 'ply' ? `${base}/mesh` : `${base}/mesh?format=${name}`,
+              `${id}${ending}`,
+              `Mesh, ${title}`,
+              name === 'ply' ? `${bytes(Number(reconstruction.meshBytes ?? 0))}, ${note}` : note,
+            ),
           )}
-        {done && link(`${base}/mesh.glb`, `${id}.glb`, 'Mesh, GLB', 'binary glTF 2.0, for viewers')}
         {!done &&
           link(
             `${base}/mesh?partial=true`,

@@ -116,6 +116,10 @@ export class FakeApi {
     if (!path.startsWith('/v1/')) return this.file(path, response);
     const route = path.slice(4).split('/').map(decodeURIComponent);
     if (path === '/v1/options') return json(response, { options: OPTIONS.map(toOption) });
+    if (path === '/v1/formats') {
+      const format = (name, title) => ({ name, ending: `.${name}`, title, note: '' });
+      return json(response, { formats: [format('ply', 'PLY'), format('glb', 'GLB')] });
+    }
     if (path === '/v1/workers') {
       const lastSeen = new Date(Date.now() - 1200).toISOString();
       return json(response, {

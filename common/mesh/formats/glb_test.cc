@@ -1,4 +1,4 @@
-#include "common/mesh/glb.h"
+#include "common/mesh/formats/glb.h"
 
 #include <filesystem>
 #include <string>
@@ -144,7 +144,7 @@ TEST_F(GlbTest, EmptyMeshIsASceneWithoutNodes) {
 }
 
 TEST_F(GlbTest, FolderThatDoesNotExistIsAnErrorThatNamesTheFile) {
-  const absl::Status status = WriteGlb({}, "/nowhere/at/all.glb");
+  const absl::Status status = WriteGlb(TriangleMesh{}, "/nowhere/at/all.glb");
   EXPECT_NE(status.ToString().find("/nowhere/at/all.glb"), std::string::npos);
 }
 

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+#include <absl/status/status.h>
+
+#include "clients/cpp/service_client.h"
+
+namespace meshwright {
+
+// Downloads the mesh and writes it in the format that the ending of `path` says.
+absl::Status FetchMesh(ServiceClient& client, const std::string& id, const std::string& path);
+
+}  // namespace meshwright

@@ -1,0 +1,105 @@
+#include "common/mesh/formats/mesh_format.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <nlohmann/json.hpp>
+
+#include "common/base/status_macros.h"
+#include "common/mesh/formats/glb.h"
+#include "common/mesh/formats/las.h"
+#include "common/mesh/formats/obj.h"
+#include "common/mesh/formats/stl.h"
+
+namespace meshwright {
+namespace {
+
+absl::Status WritePlyRows(const MeshRows& mesh, const std::string& path) {
+  constexpr size_t kRowsAtOnce = 1 << 14;
+  const PlyAttributes attributes = mesh.attributes();
+  MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, attributes));
+  for (size_t begin = 0; begin < mesh.vertices(); begin += kRowsAtOnce) {
+    TriangleMesh part;
+    for (size_t v = begin; v < std::min(mesh.vertices(), begin + kRowsAtOnce); ++v) {
+      part.positions.push_back(mesh.Position(v));
+      if (attributes.normals) part.normals.push_back(mesh.Normal(v));
+      if (attributes.colors) part.colors.push_back(mesh.Color(v));
+      if (attributes.quality) part.quality.push_back(mesh.Quality(v));
+      if (attributes.cameras) part.cameras.push_back(mesh.Camera(v));
+    }
+    MW_RETURN_IF_ERROR(writer.Append(part));
+  }
+  std::vector<std::array<uint32_t, 3>> faces;
+  for (size_t begin = 0; begin < mesh.faces(); begin += kRowsAtOnce) {
+    faces.clear();
+    for (size_t f = begin; f < std::min(mesh.faces(), begin + kRowsAtOnce); ++f) faces.push_back(mesh.Face(f));
+    MW_RETURN_IF_ERROR(writer.AppendFaces(faces));
+  }
+  return writer.Commit();
+}
+
+// "ply, glb, ...".
+std::string ListOf(const char* MeshFormat::*member) {
+  return absl::StrJoin(MeshFormats(), ", ",
+                       [member](std::string* out, const MeshFormat& format) { absl::StrAppend(out, format.*member); });
+}
+
+}  // namespace
+
+const std::vector<MeshFormat>& MeshFormats() {
+  static const auto* const formats = new std::vector<MeshFormat>{
+      {"ply", ".ply", "model/ply", "PLY", "every attribute", false, WritePlyRows},
+      {"glb", ".glb", "model/gltf-binary", "GLB (binary glTF 2.0)", "for viewers and web pages", true,
+       [](const MeshRows& mesh, const std::string& path) { return WriteGlb(mesh, path); }},
+      {"obj", ".obj", "model/obj", "OBJ", "text, for every program", true, WriteObj},
+      {"stl", ".stl", "model/stl", "STL (binary)", "triangles alone, for printing and CAD", false, WriteStl},
+      {"las", ".las", "application/vnd.las", "LAS 1.2 point cloud", "vertices with colours, for GIS", false, WriteLas},
+  };
+  return *formats;
+}
+
+absl::StatusOr<const MeshFormat*> MeshFormatOfPath(const std::string& path) {
+  const std::string ending = absl::AsciiStrToLower(std::filesystem::path(path).extension().string());
+  for (const MeshFormat& format : MeshFormats()) {
+    if (ending == format.ending) return &format;
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat(path, ": the ending of its name is \"", ending, "\", expected one of ", MeshFormatEndings()));
+}
+
+absl::StatusOr<const MeshFormat*> MeshFormatByName(const std::string& name) {
+  for (const MeshFormat& format : MeshFormats()) {
+    if (name == format.name) return &format;
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat("format is \"", name.substr(0, 32), "\", expected one of ", ListOf(&MeshFormat::name)));
+}
+
+std::string MeshFormatEndings() { return ListOf(&MeshFormat::ending); }
+
+bool IsPly(const MeshFormat& format) { return &format == MeshFormats().data(); }
+
+std::string DescribeMeshFormats() {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const MeshFormat& format : MeshFormats()) {
+    list.push_back({{"name", format.name},
+                    {"ending", format.ending},
+                    {"mediaType", format.media_type},
+                    {"title", format.title},
+                    {"note", format.note}});
+  }
+  nlohmann::ordered_json answer;
+  answer["formats"] = std::move(list);
+  return answer.dump();
+}
+
+absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, bool points, const std::string& path) {
+  MW_ASSIGN_OR_RETURN(MeshRows mesh, MeshRows::OpenPly(ply_path));
+  if (points) mesh.DropFaces();
+  return format.write(mesh, path);
+}
+
+}  // namespace meshwright

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "common/mesh/formats/mesh_rows.h"
+
+namespace meshwright {
+
+// A format that a mesh can be written in. Every program reads this one table.
+struct MeshFormat {
+  const char* name;    // "glb": what ?format= takes
+  const char* ending;  // ".glb"
+  const char* media_type;
+  const char* title;  // for people
+  const char* note;   // what it keeps
+  bool textured;      // can carry a texture atlas
+  // The file appears whole or not at all. `path` names the file; it need not have the ending.
+  absl::Status (*write)(const MeshRows& mesh, const std::string& path);
+};
+
+// PLY, what a reconstruction writes by itself, is the first.
+const std::vector<MeshFormat>& MeshFormats();
+
+// By the ending of a file's name, whatever the case. InvalidArgument tells the endings that there are.
+absl::StatusOr<const MeshFormat*> MeshFormatOfPath(const std::string& path);
+// By name. InvalidArgument tells the names that there are.
+absl::StatusOr<const MeshFormat*> MeshFormatByName(const std::string& name);
+// ".ply, .glb, ...".
+std::string MeshFormatEndings();
+bool IsPly(const MeshFormat& format);
+
+// {"formats": [{"name": "ply", ...}, ...]} for those who offer the formats to their users.
+std::string DescribeMeshFormats();
+
+// Writes the mesh of a PLY file in another format, in memory that does not grow with the mesh when the file is one of
+// ours. `points`: its vertices alone. Errors: those of MeshRows::OpenPly and of the format.
+absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, bool points, const std::string& path);
+
+}  // namespace meshwright

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <charconv>
+#include <string>
+
+#include <Eigen/Core>
+
+namespace meshwright::obj {
+
+// " 0.25": the shortest digits that give back the same float, whatever the locale.
+inline void AppendNumber(float value, std::string& text) {
+  char digits[32];
+  const std::to_chars_result end = std::to_chars(digits, digits + sizeof(digits), value);
+  text += ' ';
+  text.append(digits, end.ptr);
+}
+
+// "v 1 2 3".
+template <typename Vector>
+void AppendNumbers(const char* keyword, const Vector& vector, std::string& text) {
+  text += keyword;
+  for (Eigen::Index k = 0; k < vector.size(); ++k) AppendNumber(vector[k], text);
+}
+
+}  // namespace meshwright::obj
