@@ -5,9 +5,10 @@
 #include <absl/strings/str_cat.h>
 
 #include "pipeline/inspection/inspection.h"
-#include "pipeline/options/reconstruction_options.h"
+#include "pipeline/options/option_table.h"
 
 #include "cli/commands.h"
+#include "cli/reconstruction_flags.h"
 #include "common/base/bad_input.h"
 #include "common/base/thread_pool.h"
 
@@ -27,7 +28,7 @@ struct Arguments {
 };
 
 int RunCommand(const Arguments& arguments) {
-  if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
+  if (const absl::Status valid = CheckOptions(arguments.options, "--"); !valid.ok()) {
     return FailWrongUse(std::string(valid.message()));
   }
   const absl::StatusOr<Scene> scene = LoadScene(arguments.scene);
@@ -53,9 +54,7 @@ void AddInspectCommand(CLI::App& program, Run& run) {
   AddSceneOptions(command, arguments->scene);
   AddThreadsOption(command, arguments->threads);
   AddOutputOptions(command, arguments->output);
-  VisitOptions(arguments->options, [&](const char* group, const char* name, auto& field, const char* help) {
-    command.add_option(absl::StrCat("--", name), field, help)->group(group)->capture_default_str();
-  });
+  AddReconstructionFlags(command, arguments->options);
   command.callback([arguments, &run] { run = [arguments] { return RunCommand(*arguments); }; });
 }
 

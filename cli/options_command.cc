@@ -5,21 +5,29 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 
-#include "pipeline/options/reconstruction_options.h"
+#include "pipeline/options/option_table.h"
 
 #include "cli/commands.h"
 
 namespace meshwright {
 namespace {
 
+nlohmann::ordered_json ToJson(OptionValue value) {
+  return std::visit([](auto number) { return nlohmann::ordered_json(number); }, value);
+}
+
 std::string AsJson() {
   nlohmann::ordered_json options = nlohmann::ordered_json::array();
-  for (const OptionDescription& option : DescribeOptions()) {
-    options.push_back({{"group", option.group},
+  for (const Option& option : OptionTable()) {
+    options.push_back({{"group", option.section},
                        {"name", option.name},
-                       {"type", option.default_value.is_number_integer() ? "integer" : "number"},
-                       {"default", option.default_value},
-                       {"help", option.help}});
+                       {"type", option.is_integer() ? "integer" : "number"},
+                       {"unit", option.unit},
+                       {"default", ToJson(option.Default())},
+                       {"minimum", option.minimum},
+                       {"maximum", option.maximum},
+                       {"help", option.help},
+                       {"trade_off", option.trade_off}});
   }
   return options.dump(2) + "\n";
 }
@@ -31,29 +39,32 @@ std::string AsMarkdown() {
       "Jancosek,\n"
       "Shekhovtsov, Pajdla 2009. `meshwright reconstruct` and `meshwright submit` take them as flags (`--lattice-step "
       "1`), the\n"
-      "REST and gRPC interfaces as members of `options` (`{\"lattice-step\": 1}`).\n\n"
+      "REST and gRPC interfaces as members of `options_json` (`{\"lattice-step\": 1}`). Both ends of a range are "
+      "allowed.\n\n"
       "This page is what `meshwright options --markdown` prints.\n";
-  std::string group;
-  for (const OptionDescription& option : DescribeOptions()) {
-    if (option.group != group) {
-      group = option.group;
-      absl::StrAppend(&page, "\n## ", group, "\n| option | default | meaning |\n|---|---|---|\n");
+  std::string section;
+  for (const Option& option : OptionTable()) {
+    if (option.section != section) {
+      section = option.section;
+      absl::StrAppend(&page, "\n## ", section,
+                      "\n| option | default | range | meaning | what it costs |\n|---|---|---|---|---|\n");
     }
-    absl::StrAppend(&page, "| `--", option.name, "` | ", option.default_value.dump(), " | ",
-                    absl::StrReplaceAll(option.help, {{"|", "\\|"}}), " |\n");
+    absl::StrAppend(&page, "| `--", option.name, "` | ", FormatValue(option.Default()), " | ", DescribeRange(option),
+                    " | ", absl::StrReplaceAll(option.help, {{"|", "\\|"}}), " | ", option.trade_off, " |\n");
   }
   return page;
 }
 
 std::string AsText() {
   std::string text;
-  std::string group;
-  for (const OptionDescription& option : DescribeOptions()) {
-    if (option.group != group) {
-      group = option.group;
-      absl::StrAppend(&text, text.empty() ? "" : "\n", group, "\n");
+  std::string section;
+  for (const Option& option : OptionTable()) {
+    if (option.section != section) {
+      section = option.section;
+      absl::StrAppend(&text, text.empty() ? "" : "\n", section, "\n");
     }
-    absl::StrAppend(&text, "  --", option.name, " (", option.default_value.dump(), "): ", option.help, "\n");
+    absl::StrAppend(&text, "  --", option.name, " (", FormatValue(option.Default()), "; ", DescribeRange(option),
+                    "): ", option.help, "; ", option.trade_off, "\n");
   }
   return text;
 }

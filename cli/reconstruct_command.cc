@@ -8,10 +8,12 @@
 #include <unistd.h>
 
 #include "pipeline/local/local_reconstruction.h"
+#include "pipeline/options/option_table.h"
 
 #include "cli/commands.h"
 #include "cli/loss_follower.h"
 #include "cli/progress_display.h"
+#include "cli/reconstruction_flags.h"
 #include "common/base/clock.h"
 #include "common/mesh/formats/mesh_format.h"
 
@@ -71,7 +73,7 @@ void PrintSummary(const nlohmann::ordered_json& report, const LocalSettings& set
 
 int Reconstruct(Arguments& arguments) {
   LocalSettings& settings = arguments.settings;
-  if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
+  if (const absl::Status valid = CheckOptions(arguments.options, "--"); !valid.ok()) {
     return FailWrongUse(std::string(valid.message()));
   }
   const absl::StatusOr<const MeshFormat*> format = MeshFormatOfPath(settings.output_path);
@@ -158,9 +160,7 @@ void AddReconstructCommand(CLI::App& program, Run& run) {
                   "result [512 for each thread, at least 1024]")
       ->check(CLI::Range(int64_t{64}, int64_t{1} << 30));
   AddOutputOptions(command, arguments->output);
-  VisitOptions(arguments->options, [&](const char* group, const char* name, auto& field, const char* help) {
-    command.add_option(absl::StrCat("--", name), field, help)->group(group)->capture_default_str();
-  });
+  AddReconstructionFlags(command, arguments->options);
   command.callback([arguments, &run] { run = [arguments] { return Reconstruct(*arguments); }; });
 }
 

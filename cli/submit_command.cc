@@ -10,10 +10,12 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
-#include "pipeline/options/reconstruction_options.h"
+#include "pipeline/options/option_table.h"
+#include "pipeline/options/options_json.h"
 
 #include "cli/commands.h"
 #include "cli/mesh_output.h"
+#include "cli/reconstruction_flags.h"
 #include "cli/service_arguments.h"
 #include "common/base/status_macros.h"
 #include "common/mesh/formats/mesh_format.h"
@@ -85,7 +87,7 @@ absl::Status Upload(const Arguments& arguments, ServiceClient& client) {
 }
 
 int Submit(Arguments& arguments) {
-  if (const absl::Status valid = arguments.options.Validate(); !valid.ok()) {
+  if (const absl::Status valid = CheckOptions(arguments.options, "--"); !valid.ok()) {
     return FailWrongUse(std::string(valid.message()));
   }
   if (!arguments.output_path.empty()) {
@@ -148,9 +150,7 @@ void AddSubmitCommand(CLI::App& program, Run& run) {
   command.add_option("-o,--output", arguments->output_path,
                      absl::StrCat("wait and write the mesh; its ending says the format: ", MeshFormatEndings()));
   AddServiceOptions(command, arguments->service);
-  VisitOptions(arguments->options, [&](const char* group, const char* name, auto& field, const char* help) {
-    command.add_option(absl::StrCat("--", name), field, help)->group(group)->capture_default_str();
-  });
+  AddReconstructionFlags(command, arguments->options);
   command.callback([arguments, &run] { run = [arguments] { return Submit(*arguments); }; });
 }
 

@@ -3,9 +3,18 @@
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 
+#include "common/json/parse_json.h"
+
 namespace meshwright {
 
 using Json = nlohmann::ordered_json;
+
+namespace {
+
+// A job may look at many surfaces that were accepted before.
+constexpr JsonLimits kLimits = {.max_bytes = size_t{256} << 20, .max_depth = 3};
+
+}  // namespace
 
 std::string EncodeJobSpec(const StoredJobSpec& spec) {
   Json json = {{"targets", spec.targets}, {"accepted", Json::array()}, {"memory_bytes", spec.memory_bytes}};
@@ -17,8 +26,11 @@ std::string EncodeJobSpec(const StoredJobSpec& spec) {
 
 absl::StatusOr<StoredJobSpec> DecodeJobSpec(const std::string& text) {
   StoredJobSpec spec;
+  const absl::StatusOr<Json> parsed = ParseJson<Json>(text, kLimits);
+  if (!parsed.ok())
+    return absl::DataLossError(absl::StrCat("a camera job's specification ", parsed.status().message()));
+  const Json& json = *parsed;
   try {
-    const Json json = Json::parse(text);
     spec.targets = json.at("targets").get<std::vector<CameraIndex>>();
     spec.memory_bytes = json.at("memory_bytes").get<std::vector<int64_t>>();
     for (const Json& surface : json.at("accepted")) {

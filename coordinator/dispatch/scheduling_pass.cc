@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include <absl/strings/str_cat.h>
-#include <nlohmann/json.hpp>
 
 #include "common/blob/blob_store.h"
+#include "common/json/parse_json.h"
 
 namespace meshwright {
 namespace {
@@ -135,7 +135,7 @@ void SchedulingPass::ApplyHeldJob(const v1::SynchronizeRequest& request, const v
     case v1::HeldJob::kFinished: {
       // Also when the lease ran out and nobody has taken the job over.
       const v1::HeldJob::Finished& finished = held.finished();
-      const bool is_report = nlohmann::json::accept(finished.report_json());
+      const bool is_report = ParseJson(finished.report_json()).ok();
       if (!ValidateDigest(finished.filtered_digest()).ok() || !is_report) {
         if (is_leased) {
           Add(index, FailureOf(job, is_report ? "filtered_digest: no digest" : "report_json: no JSON", false));

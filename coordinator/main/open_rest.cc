@@ -6,7 +6,7 @@
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
-#include "pipeline/options/option_ranges.h"
+#include "pipeline/options/options_json.h"
 
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
@@ -56,7 +56,7 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
   RestServices services = {.reconstructions = &reconstructions,
                            .workers = &workers,
                            .blobs = &blobs,
-                           .options_json = DescribeOptionsWithRanges()};
+                           .options_json = DescribeOptionsForRest()};
   services.ready = [&blobs, &store]() -> absl::Status {
     MW_RETURN_IF_ERROR(store.Now().status());
     // No blob has this digest; who says so can be reached.

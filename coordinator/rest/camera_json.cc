@@ -11,6 +11,7 @@
 #include <absl/time/time.h>
 
 #include "common/base/status_macros.h"
+#include "common/json/parse_json.h"
 #include "common/scene/scene.h"
 #include "coordinator/rest/json.h"
 
@@ -39,8 +40,9 @@ double NumberAt(const Json& report, const char* name) {
 }
 
 void AddReport(const v1::Camera& camera, Json& json) {
-  const Json report = Json::parse(camera.report_json(), nullptr, false);
-  if (!report.is_object()) return;
+  const absl::StatusOr<Json> parsed = ParseJson<Json>(camera.report_json());
+  if (!parsed.ok() || !parsed->is_object()) return;
+  const Json& report = *parsed;
   const double rays = NumberAt(report, "rays");
   const auto share = [&](double part) { return rays > 0 ? part / rays : 0.0; };
   json["shares"] = {{"coveredBefore", share(NumberAt(report, "rays_covered_before"))},

@@ -7,9 +7,15 @@
 #include <google/protobuf/util/json_util.h>
 
 #include "common/base/check.h"
+#include "common/json/parse_json.h"
 #include "coordinator/rest/problem.h"
 
 namespace meshwright {
+namespace {
+
+constexpr size_t kMaxJsonBytes = size_t{1} << 20;
+
+}  // namespace
 
 std::string ToJson(const google::protobuf::Message& message) {
   google::protobuf::util::JsonPrintOptions options;
@@ -20,16 +26,19 @@ std::string ToJson(const google::protobuf::Message& message) {
 }
 
 absl::Status FromJson(const std::string& json, google::protobuf::Message& message) {
-  const nlohmann::json object = nlohmann::json::parse(json, nullptr, false);
-  if (!object.is_object()) return absl::InvalidArgumentError("the body is not a JSON object");
+  const absl::StatusOr<nlohmann::json> object = ParseJson(json, {.max_bytes = kMaxJsonBytes});
+  if (!object.ok()) {
+    return absl::InvalidArgumentError(absl::StrCat("the body ", std::string(object.status().message())));
+  }
+  if (!object->is_object()) return absl::InvalidArgumentError("the body is not a JSON object");
   // One field after the other, so that the field to blame has a name.
-  for (const auto& [name, value] : object.items()) {
+  for (const auto& [name, value] : object->items()) {
     const google::protobuf::FieldDescriptor* field = message.GetDescriptor()->FindFieldByCamelcaseName(name);
     if (field == nullptr) {
       return FieldError(name.substr(0, 64),
                         absl::InvalidArgumentError(absl::StrCat("there is no field \"", name.substr(0, 64), "\"")));
     }
-    // What is nested is not looked into: it may be nested more deeply than the stack is high.
+    // No message of the interface has a field that is an array or an object.
     nlohmann::json single = nlohmann::json::object();
     if (!value.is_structured()) single[name] = value;
     const std::unique_ptr<google::protobuf::Message> parsed(message.New());

@@ -1,6 +1,6 @@
 #include "pipeline/config/parse_config.h"
 
-#include "pipeline/options/parse_options.h"
+#include "pipeline/options/options_json.h"
 
 #include "common/base/status_macros.h"
 #include "worker/job_input/camera_job_input.h"

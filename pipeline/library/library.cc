@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/local/local_reconstruction.h"
-#include "pipeline/options/parse_options.h"
+#include "pipeline/options/options_json.h"
 
 #include "common/base/status_macros.h"
 #include "worker/camera_job/camera_job.h"

@@ -13,6 +13,7 @@
 
 #include "pipeline/local/report.h"
 #include "pipeline/local/work_folder.h"
+#include "pipeline/options/options_json.h"
 #include "pipeline/texturing/texture_mesh.h"
 
 #include "common/base/bad_input.h"

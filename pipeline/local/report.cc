@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "common/base/status_macros.h"
+#include "common/json/parse_json.h"
 
 namespace meshwright {
 namespace {
@@ -44,10 +45,11 @@ absl::StatusOr<Json> MakeCamerasReport(const Scene& scene, JobStore& store, cons
       cameras.push_back(std::move(entry));
       continue;
     }
-    const Json report = Json::parse(job.report_json, nullptr, false);
-    if (!report.is_object()) {
+    const absl::StatusOr<Json> parsed = ParseJson<Json>(job.report_json);
+    if (!parsed.ok() || !parsed->is_object()) {
       return absl::DataLossError("the store holds a report of a camera job that is not an object");
     }
+    const Json& report = *parsed;
     entry.update(report);
     Json weak = Json::array();
     for (const CameraIndex target : job.weak_targets) weak.push_back(NameOf(scene, target));

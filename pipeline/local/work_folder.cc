@@ -11,10 +11,11 @@
 #include <absl/strings/str_join.h>
 #include <sys/stat.h>
 
-#include "pipeline/options/reconstruction_options.h"
+#include "pipeline/options/options_json.h"
 
 #include "common/base/status_macros.h"
 #include "common/blob/filesystem_blob_store.h"
+#include "common/json/parse_json.h"
 #include "coordinator/store/sqlite_job_store.h"
 
 namespace meshwright {
@@ -82,9 +83,12 @@ absl::Status WorkFolder::OpenStores(const std::string& scene_digest, const std::
     differences.emplace_back("the scene (photographs, cameras or sparse points) is another one");
   }
   if (stored->options_json != options_json) {
-    const auto before = nlohmann::ordered_json::parse(stored->options_json, nullptr, false);
-    const auto now = nlohmann::ordered_json::parse(options_json, nullptr, false);
-    const std::vector<std::string> options = DescribeDifferences(before, now);
+    const auto before = ParseJson<nlohmann::ordered_json>(stored->options_json);
+    if (!before.ok()) {
+      return absl::DataLossError(absl::StrCat(path_, "/", kState, ": the options ", before.status().message()));
+    }
+    MW_ASSIGN_OR_RETURN(const auto now, ParseJson<nlohmann::ordered_json>(options_json));
+    const std::vector<std::string> options = DescribeDifferences(*before, now);
     differences.insert(differences.end(), options.begin(), options.end());
   }
   if (!differences.empty()) {

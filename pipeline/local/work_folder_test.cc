@@ -6,8 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pipeline/options/reconstruction_options.h"
-
 #include "common/base/check.h"
 #include "common/base/files.h"
 
@@ -111,19 +109,6 @@ TEST_F(WorkFolderTest, DamagedStateIsNamed) {
 TEST_F(WorkFolderTest, AMissingParentIsNamed) {
   path_ = parent_ + "/nowhere/work";
   EXPECT_THAT(std::string(Open('a', "{}").status().message()), HasSubstr(path_));
-}
-
-TEST(ReconstructionOptionsTest, EveryOptionHasItsNameOnceAndTheDefaultsAreValid) {
-  const ReconstructionOptions options;
-  EXPECT_TRUE(options.Validate().ok()) << options.Validate();
-  int visited = 0;
-  VisitOptions(options, [&](const char* group, const char*, const auto&, const char* help) {
-    ++visited;
-    EXPECT_GT(std::string(group).size(), 0);
-    EXPECT_GT(std::string(help).size(), 0);
-  });
-  EXPECT_EQ(ToJson(options).size(), visited + 1);  // and the version
-  EXPECT_TRUE(DescribeDifferences(ToJson(options), ToJson(options)).empty());
 }
 
 }  // namespace

@@ -351,32 +351,5 @@ TEST_F(RestTest, ServesThePageAndNothingBesideIt) {
   }
 }
 
-TEST_F(RestTest, OptionsSayWhatIsAccepted) {
-  const Json options = GetJson("/v1/options")["options"];
-  ASSERT_GT(options.size(), 20U);
-  int tried = 0;
-  const auto create = [&](const Json& option, const Json& value) {
-    const Json request = {{"id", absl::StrCat("o", ++tried)},
-                          {"optionsJson", Json({{option["name"].get<std::string>(), value}}).dump()}};
-    return PostJson("/v1/reconstructions", request.dump())->status;
-  };
-  for (const Json& option : options) {
-    for (const char* bound : {"minimum", "maximum"}) {
-      if (option.contains(bound)) {
-        EXPECT_EQ(create(option, option[bound]), 200) << option;
-      }
-    }
-    for (const char* bound : {"exclusiveMinimum", "exclusiveMaximum"}) {
-      if (option.contains(bound)) {
-        EXPECT_EQ(create(option, option[bound]), 400) << option;
-      }
-    }
-    if (option["type"] == "integer" && option.contains("minimum")) {
-      EXPECT_EQ(create(option, option["minimum"].get<int64_t>() - 1), 400) << option;
-    }
-  }
-  EXPECT_GT(tried, 40);
-}
-
 }  // namespace
 }  // namespace meshwright

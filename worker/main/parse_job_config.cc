@@ -1,6 +1,6 @@
 #include "worker/main/parse_job_config.h"
 
-#include "pipeline/options/parse_options.h"
+#include "pipeline/options/options_json.h"
 
 #include "common/base/status_macros.h"
 

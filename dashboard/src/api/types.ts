@@ -107,12 +107,12 @@ export interface Option {
   name: string;
   group: string;
   type: 'integer' | 'number';
+  unit: string;
   default: number;
-  minimum?: number;
-  exclusiveMinimum?: number;
-  maximum?: number;
-  exclusiveMaximum?: number;
+  minimum: number;
+  maximum: number;
   documentation: string;
+  tradeOff: string;
 }
 
 export interface Format {

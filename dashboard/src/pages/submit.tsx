@@ -76,18 +76,13 @@ function DropZone({ onFiles }: { onFiles: (files: FileToSend[], name: string) =>
 }
 
 function rangeOf(option: Option): string {
-  const parts: string[] = [];
-  if (option.minimum !== undefined) parts.push(`at least ${option.minimum}`);
-  if (option.exclusiveMinimum !== undefined) parts.push(`more than ${option.exclusiveMinimum}`);
-  if (option.maximum !== undefined) parts.push(`at most ${option.maximum}`);
-  if (option.exclusiveMaximum !== undefined) parts.push(`less than ${option.exclusiveMaximum}`);
-  return parts.join(', ');
+  const unit = option.unit === '' ? '' : ` ${option.unit}`;
+  return `${option.minimum} to ${option.maximum}${unit}`;
 }
 
 function OptionField(props: { option: Option; value: string; onChange: (value: string) => void }) {
   const { option, value } = props;
   const id = `option-${option.name}`;
-  const range = rangeOf(option);
   return (
     <div class="option">
       <label for={id} class="mono">
@@ -105,8 +100,7 @@ function OptionField(props: { option: Option; value: string; onChange: (value: s
         onInput={(event) => props.onChange(event.currentTarget.value)}
       />
       <p id={`${id}-help`} class="muted small">
-        {option.documentation}. Default {option.default}
-        {range !== '' && `; ${range}`}.
+        {option.documentation}. {rangeOf(option)}, default {option.default}. {option.tradeOff}.
       </p>
     </div>
   );

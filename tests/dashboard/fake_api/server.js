@@ -15,24 +15,10 @@ const TYPES = {
   '.svg': 'image/svg+xml',
 };
 const OPTIONS = [
-  ['ReconstructionConfig', 'max-image-size', 'integer', 0, { minimum: 0 }, 'longest side of the images used, px; 0: as they are'],
-  [
-    'ReconstructionConfig',
-    'lattice-step',
-    'integer',
-    2,
-    { minimum: 1, maximum: 16 },
-    "gamma: spacing of the reference camera's rays, px",
-  ],
-  ['ReconstructionConfig', 'window', 'integer', 4, { minimum: 1 }, 'W: cameras chosen and not yet committed at the same time'],
-  [
-    'Seeds (3.5)',
-    'min-seed-quality',
-    'number',
-    0.6,
-    { minimum: -1, maximum: 1 },
-    'photo-consistency that a seed must reach',
-  ],
+  ['Reconstruction', 'max-image-size', 'integer', 'px', 0, [0, 100000], 'longest side of the images used; 0: as they are'],
+  ['Reconstruction', 'lattice-step', 'integer', 'px', 2, [1, 16], "gamma: spacing of the reference camera's rays"],
+  ['Reconstruction', 'window', 'integer', '', 4, [1, 100000], 'W: cameras chosen and not yet committed at the same time'],
+  ['Seeds (3.5)', 'min-seed-quality', 'number', '', 0.6, [-1, 1], 'photo-consistency that a seed must reach'],
 ];
 
 export class FakeApi {
@@ -286,8 +272,8 @@ export class FakeApi {
   }
 }
 
-function toOption([group, name, type, preset, range, documentation]) {
-  return { group, name, type, default: preset, ...range, documentation };
+function toOption([group, name, type, unit, preset, [minimum, maximum], documentation]) {
+  return { group, name, type, unit, default: preset, minimum, maximum, documentation, tradeOff: 'more: more of it' };
 }
 
 async function bodyOf(request) {

@@ -1,0 +1,107 @@
+#include "pipeline/options/options_json.h"
+
+#include <cstdint>
+#include <limits>
+
+#include <absl/strings/str_cat.h>
+
+#include "pipeline/options/option_table.h"
+
+#include "common/base/status_macros.h"
+#include "common/json/parse_json.h"
+
+namespace meshwright {
+namespace {
+
+constexpr char kVersion[] = "version";
+
+absl::Status Wrong(const std::string& message) {
+  return absl::InvalidArgumentError(absl::StrCat("options_json: ", message));
+}
+
+// Whole numbers that int64_t cannot hold come as real ones, so that the range says no.
+OptionValue NumberOf(const nlohmann::json& number) {
+  constexpr auto kLargest = static_cast<uint64_t>(std::numeric_limits<int64_t>::max());
+  const bool is_whole =
+      number.is_number_integer() && !(number.is_number_unsigned() && number.get<uint64_t>() > kLargest);
+  if (is_whole) return number.get<int64_t>();
+  return number.get<double>();
+}
+
+absl::Status SetOption(const std::string& name, const nlohmann::json& json, ReconstructionOptions& options) {
+  const Option* const option = FindOption(name);
+  if (option == nullptr) return absl::InvalidArgumentError(DescribeUnknownOption(name, ""));
+  const std::string text = json.dump();
+  // What is no number is as wrong as one out of range, and answered alike.
+  const OptionValue number = json.is_number() ? NumberOf(json) : std::numeric_limits<double>::quiet_NaN();
+  MW_ASSIGN_OR_RETURN(const OptionValue value, CheckOptionValue(*option, number, text, ""));
+  option->Set(options, value);
+  return absl::OkStatus();
+}
+
+nlohmann::ordered_json ToJson(OptionValue value) {
+  return std::visit([](auto number) { return nlohmann::ordered_json(number); }, value);
+}
+
+nlohmann::ordered_json BoundToJson(const Option& option, double bound) {
+  return option.is_integer() ? nlohmann::ordered_json(static_cast<int64_t>(bound)) : nlohmann::ordered_json(bound);
+}
+
+}  // namespace
+
+absl::StatusOr<ReconstructionOptions> ParseOptions(const std::string& options_json) {
+  const absl::StatusOr<nlohmann::json> json = ParseJson(options_json.empty() ? "{}" : options_json);
+  if (!json.ok()) return Wrong(absl::StrCat("the text ", std::string(json.status().message())));
+  if (!json->is_object()) return Wrong("a JSON object expected");
+  ReconstructionOptions options;
+  for (const auto& [name, value] : json->items()) {
+    if (name == kVersion) continue;
+    if (const absl::Status set = SetOption(name, value, options); !set.ok()) return Wrong(std::string(set.message()));
+  }
+  const auto version = json->find(kVersion);
+  if (version != json->end() && *version != MW_VERSION) {
+    return Wrong(absl::StrCat("version is ", version->dump().substr(0, 40), ", this is ", MW_VERSION));
+  }
+  if (const absl::Status checked = CheckOptions(options, ""); !checked.ok()) {
+    return Wrong(std::string(checked.message()));
+  }
+  return options;
+}
+
+nlohmann::ordered_json ToJson(const ReconstructionOptions& options) {
+  nlohmann::ordered_json json;
+  json[kVersion] = MW_VERSION;
+  for (const Option& option : OptionTable()) json[option.name] = ToJson(option.Get(options));
+  return json;
+}
+
+std::vector<std::string> DescribeDifferences(const nlohmann::ordered_json& before, const nlohmann::ordered_json& now) {
+  std::vector<std::string> differences;
+  for (const auto& [name, value] : now.items()) {
+    const auto stored = before.find(name);
+    if (stored != before.end() && *stored == value) continue;
+    differences.push_back(absl::StrCat("--", name, " was ", stored == before.end() ? "not known" : stored->dump(),
+                                       ", now ", value.dump()));
+  }
+  return differences;
+}
+
+std::string DescribeOptionsForRest() {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Option& option : OptionTable()) {
+    list.push_back({{"name", option.name},
+                    {"group", option.section},
+                    {"type", option.is_integer() ? "integer" : "number"},
+                    {"unit", option.unit},
+                    {"default", ToJson(option.Default())},
+                    {"minimum", BoundToJson(option, option.minimum)},
+                    {"maximum", BoundToJson(option, option.maximum)},
+                    {"documentation", option.help},
+                    {"tradeOff", option.trade_off}});
+  }
+  nlohmann::ordered_json response;
+  response["options"] = std::move(list);
+  return response.dump();
+}
+
+}  // namespace meshwright
