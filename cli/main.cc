@@ -6,7 +6,9 @@
 
 #include "cli/commands.h"
 #include "common/program/console.h"
+#include "common/program/environment.h"
 #include "common/program/program_options.h"
+#include "common/program/usage_error.h"
 
 int main(int argc, char** argv) {
   using namespace meshwright;
@@ -31,11 +33,14 @@ int main(int argc, char** argv) {
   AddUpCommand(program, run);
   AddSubmitCommand(program, run);
   AddServiceCommands(program, run);
+  if (const auto environment = SettingsOfEnvironment({}); !environment.ok()) {
+    return FailWrongUse(std::string(environment.status().message()));
+  }
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
-    return FailWrongUse(absl::StrCat(error.what(), " (--help shows what is expected)"));
+    return FailWrongUse(absl::StrCat(DescribeUsageError(program, error), " (--help shows what is expected)"));
   }
   try {
     return run();

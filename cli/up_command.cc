@@ -80,10 +80,13 @@ void AddUpCommand(CLI::App& program, Run& run) {
   CLI::App& command = *program.add_subcommand("up", "Run a coordinator and workers on this machine");
   command.footer(kExamples);
   CoordinatorSettings& settings = arguments->coordinator;
-  command.add_option("--listen", settings.listen, "host:port; there is no authentication yet")->capture_default_str();
-  command.add_option("--data", settings.data_folder, "folder for everything that is kept")->capture_default_str();
-  command.add_option("--scene-root", settings.scene_roots, "folders that scenes may be taken from by reference")
-      ->delimiter(':');
+  NameInEnvironment(command.add_option("--listen", settings.listen, "host:port; there is no authentication yet")
+                        ->capture_default_str());
+  NameInEnvironment(
+      command.add_option("--data", settings.data_folder, "folder for everything that is kept")->capture_default_str());
+  NameInEnvironment(
+      command.add_option("--scene-root", settings.scene_roots, "folders that scenes may be taken from by reference")
+          ->delimiter(':'));
   AddRestOptions(command, settings);
   command.add_option("--workers", arguments->workers, "that share the cores of this machine")
       ->check(CLI::Range(1, 256))

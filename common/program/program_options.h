@@ -13,10 +13,6 @@ namespace meshwright {
 void NameInEnvironment(CLI::Option* option);
 // --metrics-listen
 void AddMetricsOption(CLI::App& program, std::string& address);
-void AddConfigOption(CLI::App& program);
-
-// Parses the command line with what the environment adds. Throws CLI::ParseError.
-void ParseWithEnvironment(CLI::App& program, int argc, char** argv);
 
 // Lattices and images are tens of megabytes each. The allocator would keep freed ones for later, after a while, and
 // memory would be that of the largest job times the number of threads; so large blocks always go back to the system.

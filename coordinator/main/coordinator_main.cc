@@ -36,8 +36,8 @@ int main(int argc, char** argv) {
   CoordinatorSettings settings;
   settings.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   AddCoordinatorOptions(program, settings);
-  if (const std::optional<int> over = ParseProgram(program, argc, argv)) return *over;
-  if (settings.data_folder.empty()) return FailWrongUse("--data is required (--help shows what is expected)");
+  const auto check = [&] { return CoordinatorProgram::Check(settings); };
+  if (const std::optional<int> over = ParseProgram(program, argc, argv, check)) return *over;
   // Blobs elsewhere are for workers too, who may be other users.
   if (settings.blobs.empty()) KeepFilesPrivate();
   return Serve(settings);

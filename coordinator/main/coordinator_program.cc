@@ -23,6 +23,7 @@
 #include "coordinator/api/reconstruction_service.h"
 #include "coordinator/dispatch/worker_service.h"
 #include "coordinator/grpc/grpc_server.h"
+#include "coordinator/main/check_settings.h"
 #include "coordinator/main/open_job_store.h"
 #include "coordinator/main/open_rest.h"
 #include "coordinator/rest/rest_server.h"
@@ -147,7 +148,10 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
 
 }  // namespace
 
+absl::Status CoordinatorProgram::Check(const CoordinatorSettings& settings) { return CheckSettings(settings); }
+
 absl::StatusOr<std::unique_ptr<CoordinatorProgram>> CoordinatorProgram::Start(const CoordinatorSettings& settings) {
+  MW_RETURN_IF_ERROR(CheckSettings(settings));
   auto program = std::make_unique<RealCoordinatorProgram>(settings);
   MW_RETURN_IF_ERROR(program->Open());
   return program;

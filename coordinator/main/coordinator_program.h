@@ -27,6 +27,9 @@ struct CoordinatorSettings {
 // A coordinator as meshwright-coordinator and "meshwright up" run it.
 class CoordinatorProgram {
  public:
+  // Whether the settings make sense, as far as that can be said without opening, making or contacting anything.
+  // InvalidArgument names the setting as a flag, its value and what was expected.
+  static absl::Status Check(const CoordinatorSettings& settings);
   static absl::StatusOr<std::unique_ptr<CoordinatorProgram>> Start(const CoordinatorSettings& settings);
   virtual ~CoordinatorProgram() = default;
   virtual int port() const = 0;

@@ -2,6 +2,7 @@
 
 #include <absl/strings/match.h>
 
+#include "common/base/status_macros.h"
 #include "coordinator/store/postgres_job_store.h"
 #include "coordinator/store/sqlite_job_store.h"
 
@@ -10,16 +11,26 @@ namespace {
 
 constexpr char kSqliteScheme[] = "sqlite:";
 
+bool IsSqlite(const std::string& where) { return absl::StartsWith(where, kSqliteScheme); }
+
+bool IsPostgres(const std::string& where) {
+  return absl::StartsWith(where, "postgresql://") || absl::StartsWith(where, "postgres://");
+}
+
 }  // namespace
 
+absl::Status CheckJobStore(const std::string& where) {
+  if (IsSqlite(where) || IsPostgres(where)) return absl::OkStatus();
+  // The value may hold a password.
+  return absl::InvalidArgumentError("--store: expected sqlite:PATH or postgresql://USER@HOST:PORT/DATABASE");
+}
+
 absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where, const WrapSqlDatabase& wrap) {
-  if (absl::StartsWith(where, kSqliteScheme)) {
+  MW_RETURN_IF_ERROR(CheckJobStore(where));
+  if (IsSqlite(where)) {
     return OpenSqliteJobStore(where.substr(sizeof(kSqliteScheme) - 1), nullptr, wrap);
   }
-  if (absl::StartsWith(where, "postgresql://") || absl::StartsWith(where, "postgres://")) {
-    return OpenPostgresJobStore(where, {}, wrap);
-  }
-  return absl::InvalidArgumentError("store: sqlite:PATH or postgresql://USER@HOST:PORT/DATABASE expected");
+  return OpenPostgresJobStore(where, {}, wrap);
 }
 
 }  // namespace meshwright

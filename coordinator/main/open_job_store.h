@@ -11,6 +11,9 @@
 namespace meshwright {
 
 // "sqlite:PATH" or "postgresql://USER@HOST:PORT/DATABASE". InvalidArgument for anything else.
+// InvalidArgument unless OpenJobStore knows what is meant.
+absl::Status CheckJobStore(const std::string& where);
+
 absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where, const WrapSqlDatabase& wrap = nullptr);
 
 }  // namespace meshwright

@@ -3,31 +3,15 @@
 #include <filesystem>
 #include <string>
 
-#include <absl/strings/ascii.h>
-#include <absl/strings/str_cat.h>
-
 #include "pipeline/options/options_json.h"
 
-#include "common/base/files.h"
 #include "common/base/status_macros.h"
+#include "coordinator/main/check_settings.h"
 
 namespace meshwright {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr size_t kMinTokenLength = 16;
-
-absl::StatusOr<std::string> ReadToken(const std::string& path) {
-  if (path.empty()) return std::string();
-  MW_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
-  std::string token(absl::StripAsciiWhitespace(text));
-  if (token.size() < kMinTokenLength) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(path, ": api-token-file has ", token.size(), " characters, expected at least ", kMinTokenLength));
-  }
-  return token;
-}
 
 // Beside the program as it is installed, or in the tree that it was built in. "": nowhere.
 std::string FindPage() {
@@ -49,10 +33,7 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
   RestOptions options = {.listen = settings.rest_listen,
                          .folder = settings.data_folder + "/rest",
                          .page_folder = settings.page_folder.empty() ? FindPage() : settings.page_folder};
-  if (!settings.page_folder.empty() && !fs::exists(settings.page_folder + "/index.html")) {
-    return absl::NotFoundError(absl::StrCat(settings.page_folder, ": dashboard has no index.html"));
-  }
-  MW_ASSIGN_OR_RETURN(options.token, ReadToken(settings.api_token_file));
+  MW_ASSIGN_OR_RETURN(options.token, ReadApiToken(settings.api_token_file));
   RestServices services = {.reconstructions = &reconstructions,
                            .workers = &workers,
                            .blobs = &blobs,

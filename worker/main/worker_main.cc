@@ -41,7 +41,8 @@ int main(int argc, char** argv) {
   WorkerSettings settings;
   settings.cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   AddWorkerOptions(program, settings);
-  if (const std::optional<int> over = ParseProgram(program, argc, argv)) return *over;
+  if (const std::optional<int> over = ParseProgram(program, argc, argv, [&] { return WorkerProgram::Check(settings); }))
+    return *over;
   if (settings.id.empty()) settings.id = DefaultWorkerId();
   return KeepAlive([&](bool ran_out_of_memory) {
     settings.ran_out_of_memory = ran_out_of_memory;

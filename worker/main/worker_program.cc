@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <unistd.h>
 
 #include "common/base/clock.h"
+#include "common/base/host_port.h"
 #include "common/base/status_macros.h"
 #include "common/blob/open_blob_store.h"
 #include "common/telemetry/log.h"
@@ -82,7 +84,20 @@ std::string DefaultWorkerId() {
   return absl::StrCat(host, "-", ::getpid());
 }
 
+absl::Status WorkerProgram::Check(const WorkerSettings& settings) {
+  MW_ASSIGN_OR_RETURN(const HostPort coordinator, ParseHostPort(settings.coordinator, "--coordinator"));
+  if (coordinator.port == 0) return absl::InvalidArgumentError("--coordinator has port 0, expected 1 to 65535");
+  if (!settings.metrics_listen.empty()) {
+    MW_RETURN_IF_ERROR(ParseHostPort(settings.metrics_listen, "--metrics-listen").status());
+  }
+  const bool is_folder = !absl::StrContains(settings.blobs, "://");
+  if (is_folder || ParseS3Url(settings.blobs).ok()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("--blobs is ", settings.blobs, ", expected a folder or s3://BUCKET/PREFIX"));
+}
+
 absl::StatusOr<std::unique_ptr<WorkerProgram>> WorkerProgram::Make(const WorkerSettings& settings) {
+  MW_RETURN_IF_ERROR(Check(settings));
   std::unique_ptr<BlobStore> shared_blobs;
   if (!settings.blobs.empty()) {
     MW_ASSIGN_OR_RETURN(shared_blobs, OpenBlobStore(settings.blobs));

@@ -24,6 +24,9 @@ std::string DefaultWorkerId();
 // A worker as meshwright-worker and "meshwright up" run it.
 class WorkerProgram {
  public:
+  // Whether the settings make sense, as far as that can be said without contacting anybody. InvalidArgument names the
+  // setting as a flag, its value and what was expected.
+  static absl::Status Check(const WorkerSettings& settings);
   static absl::StatusOr<std::unique_ptr<WorkerProgram>> Make(const WorkerSettings& settings);
   virtual ~WorkerProgram() = default;
   // Until Drain() and what follows from it.

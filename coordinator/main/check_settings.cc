@@ -1,0 +1,72 @@
+#include "coordinator/main/check_settings.h"
+
+#include <filesystem>
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include "common/base/files.h"
+#include "common/base/host_port.h"
+#include "common/base/status_macros.h"
+#include "common/blob/open_blob_store.h"
+#include "coordinator/main/open_job_store.h"
+
+namespace meshwright {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kMinTokenLength = 16;
+
+absl::Status CheckAddress(const std::string& text, const char* flag, bool is_optional) {
+  if (text.empty() && is_optional) return absl::OkStatus();
+  return ParseHostPort(text, flag).status();
+}
+
+absl::Status CheckFolder(const std::string& folder, const char* flag) {
+  std::error_code error;
+  if (fs::is_directory(folder, error)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(flag, " is ", folder, ", expected a folder that is there"));
+}
+
+absl::Status CheckBlobs(const std::string& where) {
+  if (!absl::StrContains(where, "://")) return absl::OkStatus();
+  if (const auto url = ParseS3Url(where); !url.ok()) {
+    return absl::InvalidArgumentError(absl::StrCat("--blobs is ", where, ", expected a folder or s3://BUCKET/PREFIX"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckPage(const std::string& folder) {
+  std::error_code error;
+  if (folder.empty() || fs::exists(fs::path(folder) / "index.html", error)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("--dashboard is ", folder, ", which has no index.html"));
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> ReadApiToken(const std::string& path) {
+  if (path.empty()) return std::string();
+  MW_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  std::string token(absl::StripAsciiWhitespace(text));
+  if (token.size() < kMinTokenLength) {
+    return absl::InvalidArgumentError(absl::StrCat("--api-token-file is ", path, ", whose token has ", token.size(),
+                                                   " characters, expected at least ", kMinTokenLength));
+  }
+  return token;
+}
+
+absl::Status CheckSettings(const CoordinatorSettings& settings) {
+  if (settings.data_folder.empty()) return absl::InvalidArgumentError("--data is required");
+  MW_RETURN_IF_ERROR(CheckAddress(settings.listen, "--listen", /*is_optional=*/false));
+  MW_RETURN_IF_ERROR(CheckAddress(settings.rest_listen, "--rest-listen", /*is_optional=*/true));
+  MW_RETURN_IF_ERROR(CheckAddress(settings.metrics_listen, "--metrics-listen", /*is_optional=*/true));
+  if (!settings.store.empty()) MW_RETURN_IF_ERROR(CheckJobStore(settings.store));
+  MW_RETURN_IF_ERROR(CheckBlobs(settings.blobs));
+  for (const std::string& root : settings.scene_roots) MW_RETURN_IF_ERROR(CheckFolder(root, "--scene-root"));
+  MW_RETURN_IF_ERROR(CheckPage(settings.page_folder));
+  return ReadApiToken(settings.api_token_file).status();
+}
+
+}  // namespace meshwright
