@@ -8,7 +8,8 @@
 
 namespace meshwright {
 
-// Downloads the mesh and writes it in the format that the ending of `path` says.
-absl::Status FetchMesh(ServiceClient& client, const std::string& id, const std::string& path);
+// Downloads the mesh and writes it in the format that the ending of `path` says. `partial`: while it is not done, the
+// surfaces accepted so far, side by side. FailedPrecondition where there is nothing yet.
+absl::Status FetchMesh(ServiceClient& client, const std::string& id, const std::string& path, bool partial);
 
 }  // namespace meshwright

@@ -1,6 +1,7 @@
 #include "cli/progress_display.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -16,8 +17,7 @@ constexpr size_t kRecentCameras = 12;
 constexpr int kLinesPerStage = 50;
 
 std::string Shares(const LocalProgress& progress) {
-  return absl::StrFormat("rays: %.0f%% covered before, %.0f%% grown, %.0f%% accepted", 100 * progress.share_covered,
-                         100 * progress.share_grown, 100 * progress.share_accepted);
+  return absl::StrCat("rays: ", DescribeShares(progress.share_covered, progress.share_grown, progress.share_accepted));
 }
 
 }  // namespace
@@ -96,6 +96,17 @@ void ProgressDisplay::ShowLine(const LocalProgress& progress) {
   const std::string remaining = last ? "" : Remaining(progress);
   std::fprintf(stream_, "%s %d/%d  %s%s%s\n", NameOf(progress.stage).c_str(), progress.done, progress.total,
                Shares(progress).c_str(), remaining.empty() ? "" : "  ", remaining.c_str());
+}
+
+std::string DescribeShares(double covered_before, double grown, double accepted) {
+  // In thousandths; what rounding leaves goes to the last.
+  const auto thousandths = [](double share) { return std::lround(1000 * std::clamp(share, 0.0, 1.0)); };
+  const long all_grown = thousandths(grown);
+  const long confirmed = std::min(thousandths(accepted), all_grown);
+  const long covered = std::min(thousandths(covered_before), 1000 - all_grown);
+  const auto percent = [](long share) { return static_cast<double>(share) / 10; };
+  return absl::StrFormat("%.1f%% covered before, %.1f%% accepted, %.1f%% not confirmed, %.1f%% empty", percent(covered),
+                         percent(confirmed), percent(all_grown - confirmed), percent(1000 - covered - all_grown));
 }
 
 }  // namespace meshwright

@@ -44,4 +44,9 @@ class ProgressDisplay {
   std::deque<std::pair<int, absl::Time>> recent_;  // (cameras done, when)
 };
 
+// Where the rays of all cameras went, from shares of report.json, in percent that add up to 100: "41.5% covered before,
+// 44.2% accepted, 3.1% not confirmed, 11.2% empty". A ray that was covered and has got a nearer patch
+// counts as the latter.
+std::string DescribeShares(double covered_before, double grown, double accepted);
+
 }  // namespace meshwright

@@ -1,5 +1,6 @@
 #include "cli/progress_display.h"
 
+#include <cstdio>
 #include <cstdlib>
 
 #include <gmock/gmock.h>
@@ -45,7 +46,7 @@ TEST(ProgressDisplayTest, PlainLinesHaveNoControlCharactersAndAreFew) {
   EXPECT_THAT(text, Not(HasSubstr("\r")));
   EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 60);
   EXPECT_THAT(text, HasSubstr("cameras 1000/1000"));
-  EXPECT_THAT(text, HasSubstr("25% grown"));
+  EXPECT_THAT(text, HasSubstr("25.0% not confirmed"));
   EXPECT_THAT(text, HasSubstr("ETA "));
 }
 
@@ -71,6 +72,26 @@ TEST(ConsoleTest, NumbersForPeople) {
   EXPECT_EQ(FormatDuration(7389), "2:03:09");
   EXPECT_EQ(FormatBytes(512.0 * (1 << 20)), "512 MiB");
   EXPECT_EQ(FormatBytes(1.5 * (1 << 30)), "1.5 GiB");
+}
+
+TEST(DescribeSharesTest, TheyAddUp) {
+  for (int covered = 0; covered <= 1000; covered += 37) {
+    for (int grown = 0; grown <= 1000; grown += 41) {
+      for (const int accepted : {0, grown / 3, grown}) {
+        const std::string text = DescribeShares(covered / 1000.0, grown / 1000.0, accepted / 1000.0);
+        double shares[4] = {};
+        ASSERT_EQ(std::sscanf(text.c_str(), "%lf%% covered before, %lf%% accepted, %lf%% not confirmed, %lf%%",
+                              &shares[0], &shares[1], &shares[2], &shares[3]),
+                  4);
+        EXPECT_NEAR(shares[0] + shares[1] + shares[2] + shares[3], 100, 1e-9) << text;
+        EXPECT_NEAR(shares[1], accepted / 10.0, 1e-9);
+        EXPECT_NEAR(shares[1] + shares[2], grown / 10.0, 1e-9);
+        for (const double share : shares) EXPECT_GE(share, 0) << text;
+      }
+    }
+  }
+  EXPECT_EQ(DescribeShares(0.4152, 0.4731, 0.442),
+            "41.5% covered before, 44.2% accepted, 3.1% not confirmed, 11.2% empty");
 }
 
 }  // namespace

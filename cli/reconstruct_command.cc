@@ -57,14 +57,15 @@ int64_t DefaultMemoryMib(int threads) { return std::max<int64_t>(1024, int64_t{5
 void PrintSummary(const nlohmann::ordered_json& report, const LocalSettings& settings) {
   const auto& totals = report["totals"];
   const auto& process = report["process"];
-  const auto percent = [](const nlohmann::ordered_json& share) { return 100 * share.get<double>(); };
   std::printf("mesh     %s: %s vertices, %s faces\n", settings.output_path.c_str(),
               FormatCount(report["mesh"]["vertices"].get<int64_t>()).c_str(),
               FormatCount(report["mesh"]["faces"].get<int64_t>()).c_str());
   std::printf("report   %s\n", settings.report_path.c_str());
-  std::printf("cameras  %d processed; of their rays %.1f%% covered before, %.1f%% grown, %.1f%% accepted\n",
-              totals["cameras_processed"].get<int>(), percent(totals["share_covered_before"]),
-              percent(totals["share_grown"]), percent(totals["share_accepted"]));
+  std::printf("cameras  %d processed\n", totals["cameras_processed"].get<int>());
+  std::printf("rays     %s\n",
+              DescribeShares(totals["share_covered_before"].get<double>(), totals["share_grown"].get<double>(),
+                             totals["share_accepted"].get<double>())
+                  .c_str());
   std::printf("took     %s (%s of CPU), %s of memory at most\n",
               FormatDuration(process["wall_seconds"].get<double>()).c_str(),
               FormatDuration(process["cpu_seconds"].get<double>()).c_str(),

@@ -20,11 +20,14 @@ struct ServiceArguments {
 };
 void AddServiceOptions(CLI::App& command, ServiceArguments& arguments);
 
+// As Fail. Where no coordinator answers it says how to start one.
+int FailCall(const absl::Status& status, const ServiceArguments& arguments);
+
 // "running", "done".
 std::string NameOf(v1::ReconstructionState state);
 // What --json prints.
 nlohmann::ordered_json ToJson(const v1::Reconstruction& reconstruction);
 // Shows progress on stderr until the reconstruction is over; the exit code says how it ended.
-int WatchUntilOver(ServiceClient& client, const std::string& id, const OutputSettings& output);
+int WatchUntilOver(const ServiceArguments& arguments, ServiceClient& client, const std::string& id);
 
 }  // namespace meshwright

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/time/clock.h>
@@ -24,6 +25,7 @@ struct Arguments {
   ServiceArguments service;
   std::string id;
   std::string output_path;
+  bool partial = false;
 };
 
 void PrintReconstruction(const v1::Reconstruction& reconstruction) {
@@ -40,9 +42,9 @@ void PrintReconstruction(const v1::Reconstruction& reconstruction) {
   std::printf("%s%s\n", reconstruction.failure().empty() ? "" : " ", reconstruction.failure().c_str());
 }
 
-int Show(const absl::StatusOr<v1::Reconstruction>& reconstruction, const OutputSettings& output) {
-  if (!reconstruction.ok()) return Fail(reconstruction.status());
-  if (output.json) {
+int Show(const absl::StatusOr<v1::Reconstruction>& reconstruction, const ServiceArguments& service) {
+  if (!reconstruction.ok()) return FailCall(reconstruction.status(), service);
+  if (service.output.json) {
     PrintJson(ToJson(*reconstruction));
   } else {
     PrintReconstruction(*reconstruction);
@@ -50,14 +52,17 @@ int Show(const absl::StatusOr<v1::Reconstruction>& reconstruction, const OutputS
   return kExitDone;
 }
 
-int ShowAll(ServiceClient& client, const OutputSettings& output) {
+int ShowAll(const ServiceArguments& service) {
+  const auto client = service.Connect();
   Json all = Json::array();
+  int all_count = 0;
   std::string page_token;
   do {
-    const absl::StatusOr<v1::ListReconstructionsResponse> page = client.List(page_token);
-    if (!page.ok()) return Fail(page.status());
+    const absl::StatusOr<v1::ListReconstructionsResponse> page = client->List(page_token);
+    if (!page.ok()) return FailCall(page.status(), service);
     for (const v1::Reconstruction& reconstruction : page->reconstructions()) {
-      if (output.json) {
+      ++all_count;
+      if (service.output.json) {
         all.push_back(ToJson(reconstruction));
       } else {
         PrintReconstruction(reconstruction);
@@ -65,13 +70,17 @@ int ShowAll(ServiceClient& client, const OutputSettings& output) {
     }
     page_token = page->next_page_token();
   } while (!page_token.empty());
-  if (output.json) PrintJson({{"reconstructions", std::move(all)}});
+  if (service.output.json) {
+    PrintJson({{"reconstructions", std::move(all)}});
+  } else if (all_count == 0) {
+    std::fprintf(stderr, "no reconstructions; submit one with: meshwright submit SCENE\n");
+  }
   return kExitDone;
 }
 
 int ShowWorkers(const Arguments& arguments) {
   const absl::StatusOr<v1::ListWorkersResponse> response = arguments.service.Connect()->ListWorkers();
-  if (!response.ok()) return Fail(response.status());
+  if (!response.ok()) return FailCall(response.status(), arguments.service);
   Json all = Json::array();
   for (const v1::Worker& worker : response->workers()) {
     const double silent = absl::ToDoubleSeconds(absl::Now() - absl::FromUnixSeconds(worker.last_seen().seconds()));
@@ -94,8 +103,9 @@ int Fetch(const Arguments& arguments) {
   if (const auto format = MeshFormatOfPath(arguments.output_path); !format.ok()) {
     return FailWrongUse(std::string(format.status().message()));
   }
-  const absl::Status status = FetchMesh(*arguments.service.Connect(), arguments.id, arguments.output_path);
-  if (!status.ok()) return Fail(status);
+  const auto client = arguments.service.Connect();
+  const absl::Status status = FetchMesh(*client, arguments.id, arguments.output_path, arguments.partial);
+  if (!status.ok()) return FailCall(status, arguments.service);
   if (arguments.service.output.json) {
     PrintJson({{"id", arguments.id}, {"mesh", arguments.output_path}});
   } else {
@@ -106,10 +116,25 @@ int Fetch(const Arguments& arguments) {
 
 int Delete(const Arguments& arguments) {
   const absl::Status status = arguments.service.Connect()->Delete(arguments.id);
-  return status.ok() ? kExitDone : Fail(status);
+  return status.ok() ? kExitDone : FailCall(status, arguments.service);
+}
+
+// Nobody listens there, as gRPC says it; a coordinator that answers has other words.
+bool IsNobodyThere(const absl::Status& status) {
+  const std::string message(status.message());
+  return absl::IsUnavailable(status) &&
+         (absl::StrContains(message, "failed to connect") || absl::StrContains(message, "DNS resolution failed") ||
+          absl::StrContains(message, "connections to all backends failing"));
 }
 
 }  // namespace
+
+int FailCall(const absl::Status& status, const ServiceArguments& arguments) {
+  if (!IsNobodyThere(status)) return Fail(status);
+  return Fail(absl::UnavailableError(
+      absl::StrCat("no coordinator answers at ", arguments.coordinator,
+                   "; \"meshwright up\" starts one here, --coordinator HOST:PORT names another")));
+}
 
 void AddServiceOptions(CLI::App& command, ServiceArguments& arguments) {
   command.add_option("--coordinator", arguments.coordinator, "its host:port")
@@ -142,18 +167,18 @@ Json ToJson(const v1::Reconstruction& reconstruction) {
   return json;
 }
 
-int WatchUntilOver(ServiceClient& client, const std::string& id, const OutputSettings& output) {
+int WatchUntilOver(const ServiceArguments& arguments, ServiceClient& client, const std::string& id) {
   v1::Reconstruction last;
   const absl::Status status = client.Watch(id, [&](const v1::Reconstruction& now) {
     const bool news =
         now.state() != last.state() || now.progress().cameras_committed() != last.progress().cameras_committed();
     last = now;
-    if (output.quiet || !news) return;
+    if (arguments.output.quiet || !news) return;
     std::fprintf(stderr, "%s: %s, cameras %d/%d\n", id.c_str(), NameOf(now.state()).c_str(),
                  now.progress().cameras_committed(), now.progress().cameras_total());
   });
-  if (!status.ok()) return Fail(status);
-  const int shown = Show(last, output);
+  if (!status.ok()) return FailCall(status, arguments);
+  const int shown = Show(last, arguments);
   return last.state() == v1::RECONSTRUCTION_STATE_DONE ? shown : kExitFailed;
 }
 
@@ -173,14 +198,13 @@ void AddServiceCommands(CLI::App& program, Run& run) {
   };
   const auto status = add("status", "Show a submitted reconstruction, or all of them", "meshwright status my-scene",
                           [](const Arguments& arguments) {
-                            const auto client = arguments.service.Connect();
-                            return arguments.id.empty() ? ShowAll(*client, arguments.service.output)
-                                                        : Show(client->Get(arguments.id), arguments.service.output);
+                            if (arguments.id.empty()) return ShowAll(arguments.service);
+                            return Show(arguments.service.Connect()->Get(arguments.id), arguments.service);
                           });
   status.first->add_option("ID", status.second->id, "the reconstruction [all]");
   add_with_id("watch", "Follow a submitted reconstruction until it is over", "meshwright watch my-scene",
               [](const Arguments& arguments) {
-                return WatchUntilOver(*arguments.service.Connect(), arguments.id, arguments.service.output);
+                return WatchUntilOver(arguments.service, *arguments.service.Connect(), arguments.id);
               });
   const auto fetch = add_with_id("fetch", "Download the mesh of a submitted reconstruction",
                                  "meshwright fetch my-scene -o mesh.ply", Fetch);
@@ -188,9 +212,11 @@ void AddServiceCommands(CLI::App& program, Run& run) {
       ->add_option("-o,--output", fetch.second->output_path,
                    absl::StrCat("the mesh to write; its ending says the format: ", MeshFormatEndings()))
       ->required();
+  fetch.first->add_flag("--partial", fetch.second->partial,
+                        "while it is not done: the surfaces accepted so far, side by side");
   add_with_id("cancel", "Stop a submitted reconstruction", "meshwright cancel my-scene",
               [](const Arguments& arguments) {
-                return Show(arguments.service.Connect()->Cancel(arguments.id), arguments.service.output);
+                return Show(arguments.service.Connect()->Cancel(arguments.id), arguments.service);
               });
   add_with_id("delete", "Stop a submitted reconstruction and remove its mesh", "meshwright delete my-scene", Delete);
   add("workers", "Show the workers that the coordinator knows", "meshwright workers", ShowWorkers);

@@ -108,12 +108,13 @@ int Submit(Arguments& arguments) {
   request.set_weight(arguments.weight);
   if (by_reference) request.set_scene_reference(arguments.scene.path);
   const absl::StatusOr<v1::Reconstruction> created = client->Create(request);
-  if (!created.ok()) return Fail(created.status());
+  if (!created.ok()) return FailCall(created.status(), arguments.service);
   if (!by_reference && created->state() == v1::RECONSTRUCTION_STATE_CREATED) {
-    if (const absl::Status status = Upload(arguments, *client); !status.ok()) return Fail(status);
+    if (const absl::Status status = Upload(arguments, *client); !status.ok())
+      return FailCall(status, arguments.service);
   }
   const absl::StatusOr<v1::Reconstruction> started = client->Start(arguments.id);
-  if (!started.ok()) return Fail(started.status());
+  if (!started.ok()) return FailCall(started.status(), arguments.service);
   const bool wait = arguments.wait || !arguments.output_path.empty();
   if (!wait) {
     if (arguments.service.output.json) {
@@ -123,10 +124,10 @@ int Submit(Arguments& arguments) {
     }
     return kExitDone;
   }
-  const int ended = WatchUntilOver(*client, arguments.id, arguments.service.output);
+  const int ended = WatchUntilOver(arguments.service, *client, arguments.id);
   if (ended != kExitDone || arguments.output_path.empty()) return ended;
-  const absl::Status fetched = FetchMesh(*client, arguments.id, arguments.output_path);
-  return fetched.ok() ? kExitDone : Fail(fetched);
+  const absl::Status fetched = FetchMesh(*client, arguments.id, arguments.output_path, /*partial=*/false);
+  return fetched.ok() ? kExitDone : FailCall(fetched, arguments.service);
 }
 
 }  // namespace

@@ -133,6 +133,31 @@ class RealServiceClient final : public ServiceClient {
     return file.Commit();
   }
 
+  absl::StatusOr<v1::ListPartsResponse> ListParts(const std::string& id) override {
+    v1::ListPartsRequest request;
+    request.set_id(id);
+    v1::ListPartsResponse response;
+    MW_RETURN_IF_ERROR(Call(&v1::ReconstructionService::Stub::ListParts, request, response));
+    return response;
+  }
+
+  absl::StatusOr<std::string> DownloadPart(const std::string& id, const v1::Part& part) override {
+    grpc::ClientContext context;
+    v1::DownloadPartRequest request;
+    request.set_id(id);
+    request.set_sequence(part.sequence());
+    const auto reader = stub_->DownloadPart(&context, request);
+    v1::DownloadPartResponse response;
+    std::string bytes;
+    while (reader->Read(&response)) bytes += response.chunk();
+    MW_RETURN_IF_ERROR(FromGrpc(reader->Finish()));
+    if (Sha256Hex(bytes) != part.sha256()) {
+      return absl::DataLossError(
+          absl::StrCat("part ", part.sequence(), " arrived without the digest that the coordinator names"));
+    }
+    return bytes;
+  }
+
   absl::StatusOr<v1::ListWorkersResponse> ListWorkers() override {
     v1::ListWorkersResponse response;
     MW_RETURN_IF_ERROR(Call(&v1::ReconstructionService::Stub::ListWorkers, v1::ListWorkersRequest(), response));

@@ -30,6 +30,10 @@ class ServiceClient {
   virtual absl::Status Delete(const std::string& id) = 0;
   // Writes the mesh to `path`, whole and with the right digest or not at all.
   virtual absl::Status Fetch(const std::string& id, const std::string& path) = 0;
+  // The surfaces accepted so far.
+  virtual absl::StatusOr<v1::ListPartsResponse> ListParts(const std::string& id) = 0;
+  // One of them, encoded (docs/formats/surface.md), with the digest that `part` names.
+  virtual absl::StatusOr<std::string> DownloadPart(const std::string& id, const v1::Part& part) = 0;
   virtual absl::StatusOr<v1::ListWorkersResponse> ListWorkers() = 0;
 };
 

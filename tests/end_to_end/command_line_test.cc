@@ -58,6 +58,15 @@ TEST(CommandLineTest, WrongUseIsTwo) {
   }
 }
 
+TEST(CommandLineTest, AnUnknownCommandOrOptionIsNamedWithTheNearest) {
+  EXPECT_THAT(RunMeshwright({"reconstrukt"}).err,
+              testing::StartsWith("meshwright: there is no command reconstrukt, did you mean reconstruct?"));
+  EXPECT_THAT(RunMeshwright({"reconstruct", "scene", "--ouput", "x.ply"}).err,
+              testing::StartsWith("meshwright: there is no option --ouput, did you mean --output?"));
+  EXPECT_THAT(RunMeshwright({"submit", "scene", "--suport", "2"}).err,
+              testing::StartsWith("meshwright: there is no option --suport, did you mean --support?"));
+}
+
 TEST(CommandLineTest, InspectSaysWhatWillBeDone) {
   const RunResult result = RunMeshwright({"inspect", SharedScene("small"), "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;

@@ -36,10 +36,32 @@ TEST(ServiceTest, SameBytesAsOneProcess) {
   EXPECT_TRUE(WIFEXITED(coordinator_status) && WEXITSTATUS(coordinator_status) == 0);
 }
 
+TEST(ServiceTest, TheSurfacesSoFarCanBeFetched) {
+  RunningService service;
+  const auto coordinator = service.StartCoordinator();
+  ASSERT_EQ(service.Client(With({"submit", SharedScene("turn"), "--id", "turn"}, kQuickOptions)).exit_code, 0);
+  const std::string path = service.folder() / "early.ply";
+  const RunResult none = service.Client({"fetch", "turn", "-o", path, "--partial"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_THAT(none.err, testing::HasSubstr("no surface is accepted yet"));
+  {
+    const auto worker = service.StartWorker("first");
+    ASSERT_TRUE(WaitUntil([&] { return service.Committed("turn") >= 3; }, 120));
+  }
+  const RunResult whole = service.Client({"fetch", "turn", "-o", path});
+  EXPECT_EQ(whole.exit_code, 1);
+  EXPECT_THAT(whole.err, testing::HasSubstr("has no mesh; --partial"));
+  EXPECT_THAT(whole.err, testing::Not(testing::HasSubstr("RECONSTRUCTION_STATE")));
+  const RunResult early = service.Client({"fetch", "turn", "-o", path, "--partial"});
+  ASSERT_EQ(early.exit_code, 0) << early.err;
+  EXPECT_THAT(ReadBytes(path), testing::StartsWith("ply\n"));
+  EXPECT_GT(ReadBytes(path).size(), 10'000U);
+}
+
 TEST(ServiceTest, ACoordinatorThatIsNotThereIsAFailureInOneLine) {
   const RunResult result = RunMeshwright({"status", "--coordinator", "127.0.0.1:1"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, testing::StartsWith("meshwright: "));
+  EXPECT_THAT(result.err, testing::StartsWith("meshwright: no coordinator answers at 127.0.0.1:1; \"meshwright up\""));
   EXPECT_EQ(result.out, "");
 }
 
