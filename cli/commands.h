@@ -7,8 +7,8 @@
 #include <absl/status/statusor.h>
 
 #include "pipeline/texturing/texture_options.h"
+#include "program/console.h"
 
-#include "common/program/console.h"
 #include "common/scene/formats/import_options.h"
 #include "common/scene/scene.h"
 

@@ -4,11 +4,12 @@
 #include <CLI/CLI.hpp>
 #include <absl/strings/str_cat.h>
 
+#include "program/console.h"
+#include "program/environment.h"
+#include "program/program_options.h"
+#include "program/usage_error.h"
+
 #include "cli/commands.h"
-#include "common/program/console.h"
-#include "common/program/environment.h"
-#include "common/program/program_options.h"
-#include "common/program/usage_error.h"
 
 int main(int argc, char** argv) {
   using namespace meshwright;

@@ -7,7 +7,7 @@
 #include <absl/strings/str_format.h>
 #include <unistd.h>
 
-#include "common/program/console.h"
+#include "program/console.h"
 
 namespace meshwright {
 namespace {

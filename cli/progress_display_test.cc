@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/program/console.h"
+#include "program/console.h"
 
 namespace meshwright {
 namespace {

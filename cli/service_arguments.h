@@ -6,8 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cpp/service_client.h"
-
-#include "common/program/console.h"
+#include "program/console.h"
 
 namespace meshwright {
 

@@ -7,8 +7,9 @@
 #include <absl/strings/str_cat.h>
 #include <unistd.h>
 
+#include "program/program_options.h"
+
 #include "cli/commands.h"
-#include "common/program/program_options.h"
 #include "coordinator/main/coordinator_options.h"
 #include "worker/main/worker_program.h"
 

@@ -3,9 +3,10 @@
 #include <optional>
 #include <thread>
 
-#include "common/program/console.h"
-#include "common/program/parse_program.h"
-#include "common/program/program_options.h"
+#include "program/console.h"
+#include "program/parse_program.h"
+#include "program/program_options.h"
+
 #include "coordinator/main/coordinator_options.h"
 
 namespace {

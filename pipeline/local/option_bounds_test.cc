@@ -14,7 +14,7 @@
 #include "tools/synthetic/synthetic_scene.h"
 
 #include "common/base/check.h"
-#include "common/scene/import.h"
+#include "common/scene/formats/import.h"
 #include "worker/camera_job/camera_job.h"
 
 namespace meshwright {
@@ -32,7 +32,7 @@ class OptionBoundsTest : public testing::Test {
     const auto made =
         MakeSyntheticScene({.kind = SyntheticKind::kFacade, .cameras = 4, .width = 96, .height = 72}, pool);
     MW_CHECK(made.ok() && WriteSyntheticScene(*made, folder_ + "/scene", pool).ok());
-    auto scene = ImportScene(folder_ + "/scene", std::nullopt);
+    auto scene = ImportScene(folder_ + "/scene");
     MW_CHECK(scene.ok());
     scene_ = *std::move(scene);
   }

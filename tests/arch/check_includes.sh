@@ -15,7 +15,7 @@ table=${2:-$root/tests/arch/rooms.txt}
 
 cd "$root"
 folders=()
-for folder in common worker coordinator pipeline tools clients cli tests; do
+for folder in common program worker coordinator pipeline tools clients cli tests; do
   if [[ -d $folder ]]; then folders+=("$folder"); fi
 done
 # Programs of others, which are built against what is installed, are no part of the house.

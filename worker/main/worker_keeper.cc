@@ -12,8 +12,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "program/console.h"
+
 #include "common/base/files.h"
-#include "common/program/console.h"
 
 namespace meshwright {
 namespace {

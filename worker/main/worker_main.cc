@@ -5,9 +5,10 @@
 
 #include <unistd.h>
 
-#include "common/program/console.h"
-#include "common/program/parse_program.h"
-#include "common/program/program_options.h"
+#include "program/console.h"
+#include "program/parse_program.h"
+#include "program/program_options.h"
+
 #include "worker/main/worker_keeper.h"
 #include "worker/main/worker_options.h"
 

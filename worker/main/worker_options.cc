@@ -1,6 +1,6 @@
 #include "worker/main/worker_options.h"
 
-#include "common/program/program_options.h"
+#include "program/program_options.h"
 
 namespace meshwright {
 

@@ -1,4 +1,4 @@
-#include "common/program/usage_error.h"
+#include "program/usage_error.h"
 
 #include <algorithm>
 #include <vector>

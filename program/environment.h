@@ -6,7 +6,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include "common/program/settings_file.h"
+#include "program/settings_file.h"
 
 namespace meshwright {
 

@@ -1,4 +1,4 @@
-#include "common/program/environment.h"
+#include "program/environment.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-#include "common/program/console.h"
+#include "program/console.h"
 
 #include <cmath>
 #include <cstdio>

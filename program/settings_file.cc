@@ -1,4 +1,4 @@
-#include "common/program/settings_file.h"
+#include "program/settings_file.h"
 
 #include <algorithm>
 #include <sstream>

@@ -1,4 +1,4 @@
-#include "common/program/program_options.h"
+#include "program/program_options.h"
 
 #include <csignal>
 #include <string>
@@ -7,7 +7,7 @@
 #include <pthread.h>
 #include <sys/stat.h>
 
-#include "common/program/environment.h"
+#include "program/environment.h"
 
 namespace meshwright {
 namespace {

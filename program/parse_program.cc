@@ -1,4 +1,4 @@
-#include "common/program/parse_program.h"
+#include "program/parse_program.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -10,14 +10,15 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
+#include "program/console.h"
+#include "program/environment.h"
+#include "program/program_options.h"
+#include "program/settings_file.h"
+#include "program/usage_error.h"
+
 #include "common/base/files.h"
 #include "common/base/nearest_name.h"
 #include "common/base/status_macros.h"
-#include "common/program/console.h"
-#include "common/program/environment.h"
-#include "common/program/program_options.h"
-#include "common/program/settings_file.h"
-#include "common/program/usage_error.h"
 
 namespace meshwright {
 namespace {

@@ -10,12 +10,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/program/console.h"
-#include "common/program/environment.h"
-#include "common/program/parse_program.h"
-#include "common/program/program_options.h"
-#include "common/program/settings_file.h"
-#include "common/program/usage_error.h"
+#include "program/console.h"
+#include "program/environment.h"
+#include "program/parse_program.h"
+#include "program/program_options.h"
+#include "program/settings_file.h"
+#include "program/usage_error.h"
 
 namespace meshwright {
 namespace {
