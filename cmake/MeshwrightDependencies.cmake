@@ -25,4 +25,5 @@ find_package(Protobuf REQUIRED)
 find_package(gRPC CONFIG REQUIRED)
 find_package(prometheus-cpp REQUIRED)
 find_package(PkgConfig REQUIRED)
+# Tests alone: an HTTP client that is not ours.
 pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib)

@@ -45,7 +45,7 @@ ServerCore::ServerCore(const HttpServerOptions& server_options, HttpHandler& ser
     : options(server_options), handler(server_handler), pool(server_options.worker_threads, kMaxWaitingTasks) {}
 
 bool ServerCore::Admit(const std::string& address) {
-  const std::lock_guard<std::mutex> lock(mutex);
+  const MutexLock lock(mutex);
   int& here = per_address[address];
   const bool shares = options.trusted_proxies.count(address) == 0;
   if (count >= options.max_connections || (shares && here >= options.max_connections_per_address)) {
@@ -58,7 +58,7 @@ bool ServerCore::Admit(const std::string& address) {
 }
 
 void ServerCore::Leave(const std::string& address) {
-  const std::lock_guard<std::mutex> lock(mutex);
+  const MutexLock lock(mutex);
   --count;
   const auto found = per_address.find(address);
   if (--found->second == 0) per_address.erase(found);
@@ -76,7 +76,7 @@ Connection::Connection(ServerCore& core, net::ip::tcp::socket socket, std::share
 
 Connection::~Connection() {
   {
-    const std::lock_guard<std::mutex> lock(core_.mutex);
+    const MutexLock lock(core_.mutex);
     core_.all.erase(this);
   }
   core_.Leave(address_);
@@ -84,7 +84,7 @@ Connection::~Connection() {
 
 void Connection::Start() {
   {
-    const std::lock_guard<std::mutex> lock(core_.mutex);
+    const MutexLock lock(core_.mutex);
     core_.all[this] = weak_from_this();
   }
   net::dispatch(tcp_.get_executor(), [self = shared_from_this()] {

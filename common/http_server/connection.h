@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -16,6 +15,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 
+#include "common/base/mutex.h"
 #include "common/http_server/fair_worker_pool.h"
 #include "common/http_server/http_message.h"
 #include "common/http_server/http_server.h"
@@ -38,10 +38,10 @@ struct ServerCore {
   FairWorkerPool pool;
   std::atomic<bool> stopping{false};
 
-  std::mutex mutex;
-  std::map<std::string, int> per_address;
-  std::unordered_map<const Connection*, std::weak_ptr<Connection>> all;
-  int count = 0;
+  Mutex mutex;
+  std::map<std::string, int> per_address ABSL_GUARDED_BY(mutex);
+  std::unordered_map<const Connection*, std::weak_ptr<Connection>> all ABSL_GUARDED_BY(mutex);
+  int count ABSL_GUARDED_BY(mutex) = 0;
 };
 
 // One client. Everything happens on the strand of its socket, but for what handlers do on worker threads; while they

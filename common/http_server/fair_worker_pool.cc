@@ -17,11 +17,11 @@ void FairWorkerPool::GiveTurn(const std::string& name, Caller& caller) {
   if (caller.has_turn || caller.waiting.empty() || caller.running >= max_running_) return;
   caller.has_turn = true;
   turns_.push_back(name);
-  wake_.notify_one();
+  wake_.NotifyOne();
 }
 
 bool FairWorkerPool::Submit(const std::string& caller, std::function<void()> task) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (stopping_ || waiting_ >= max_waiting_) return false;
   ++waiting_;
   Caller& found = callers_[caller];
@@ -31,9 +31,9 @@ bool FairWorkerPool::Submit(const std::string& caller, std::function<void()> tas
 }
 
 void FairWorkerPool::Run() {
-  std::unique_lock<std::mutex> lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
-    wake_.wait(lock, [this] { return stopping_ || !turns_.empty(); });
+    while (!stopping_ && turns_.empty()) wake_.Wait(lock);
     if (stopping_) return;
     const std::string name = std::move(turns_.front());
     turns_.pop_front();
@@ -44,10 +44,10 @@ void FairWorkerPool::Run() {
     caller.has_turn = false;
     ++caller.running;
     GiveTurn(name, caller);
-    lock.unlock();
+    lock.Unlock();
     task();
     task = nullptr;  // what it holds may be long to destroy
-    lock.lock();
+    lock.Lock();
     --caller.running;
     GiveTurn(name, caller);
     if (caller.running == 0 && caller.waiting.empty()) callers_.erase(name);
@@ -57,14 +57,14 @@ void FairWorkerPool::Run() {
 void FairWorkerPool::Shutdown() {
   std::map<std::string, Caller> dropped;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   for (std::thread& thread : threads_) {
     if (thread.joinable()) thread.join();
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   dropped.swap(callers_);
   turns_.clear();
 }

@@ -1,13 +1,13 @@
 #pragma once
 
-#include <condition_variable>
 #include <deque>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "common/base/mutex.h"
 
 namespace meshwright {
 
@@ -33,16 +33,17 @@ class FairWorkerPool {
     bool has_turn = false;  // is in turns_
   };
   void Run();
-  void GiveTurn(const std::string& name, Caller& caller);
+  void GiveTurn(const std::string& name, Caller& caller) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const int max_running_;  // of one caller
   const size_t max_waiting_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::map<std::string, Caller> callers_;
-  std::deque<std::string> turns_;  // callers that have a task and may run one more
-  size_t waiting_ = 0;
-  bool stopping_ = false;
+  Mutex mutex_;
+  ConditionVariable wake_;
+  std::map<std::string, Caller> callers_ ABSL_GUARDED_BY(mutex_);
+  // Callers that have a task and may run one more.
+  std::deque<std::string> turns_ ABSL_GUARDED_BY(mutex_);
+  size_t waiting_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   std::vector<std::thread> threads_;
 };
 

@@ -97,7 +97,7 @@ class BeastHttpServer final : public HttpServer {
   int port() const override { return port_; }
 
   int connections() const override {
-    const std::lock_guard<std::mutex> lock(core_.mutex);
+    const MutexLock lock(core_.mutex);
     return core_.count;
   }
 
@@ -173,7 +173,7 @@ class BeastHttpServer final : public HttpServer {
   size_t StopConnections() {
     std::vector<std::shared_ptr<Connection>> all;
     {
-      const std::lock_guard<std::mutex> lock(core_.mutex);
+      const MutexLock lock(core_.mutex);
       for (const auto& [key, weak] : core_.all) {
         if (auto connection = weak.lock()) all.push_back(std::move(connection));
       }

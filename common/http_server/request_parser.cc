@@ -108,6 +108,12 @@ std::optional<HttpFault> RequestParser::ParseHead(const std::string& head, const
   if (auto fault = CheckFraming(request.headers, version_ == 10, &chunked_body_, &content_bytes_)) {
     if (!request.method.empty()) return fault;
   }
+  if (error == http::error::bad_content_length || error == http::error::multiple_content_length) {
+    return HttpFault{400, "Content-Length", "Content-Length is expected once, a whole number"};
+  }
+  if (error == http::error::bad_transfer_encoding) {
+    return HttpFault{400, "Transfer-Encoding", "Transfer-Encoding is expected once, and without Content-Length"};
+  }
   if (error || !is_header_done()) return HttpFault{400, "", ""};
   return CheckHead(request);
 }

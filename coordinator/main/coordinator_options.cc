@@ -10,6 +10,15 @@ void AddRestOptions(CLI::App& program, CoordinatorSettings& settings) {
           .add_option("--rest-listen", settings.rest_listen,
                       "host:port for the REST interface and the dashboard; port 0 takes a free one [none]")
           ->capture_default_str());
+  NameInEnvironment(program.add_option("--rest-tls-cert", settings.rest_tls_certificate_file,
+                                       "file with the certificate for the REST interface and those above it, PEM; read "
+                                       "again when it changes [no TLS]"));
+  NameInEnvironment(program.add_option("--rest-tls-key", settings.rest_tls_key_file, "file with its key, PEM"));
+  NameInEnvironment(program
+                        .add_option("--trusted-proxy", settings.trusted_proxies,
+                                    "addresses of proxies in front, with \",\" between them: callers are told apart by "
+                                    "what these say in X-Forwarded-For")
+                        ->delimiter(','));
   NameInEnvironment(program.add_option("--dashboard", settings.page_folder,
                                        "folder with the dashboard's files [where they are installed]"));
   NameInEnvironment(program.add_option("--api-token-file", settings.api_token_file,

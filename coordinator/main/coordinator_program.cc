@@ -104,7 +104,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
     interceptors.push_back(MakeRpcMetrics(metrics_));
     MW_ASSIGN_OR_RETURN(
         server_, GrpcServer::Start(settings_.listen, *reconstructions_, *workers_, *blobs_, std::move(interceptors)));
-    MW_ASSIGN_OR_RETURN(rest_server_, OpenRest(settings_, *reconstructions_, *workers_, *blobs_, *store_));
+    MW_ASSIGN_OR_RETURN(rest_server_, OpenRest(settings_, *reconstructions_, *workers_, *blobs_, *store_, log_));
     MW_RETURN_IF_ERROR(ServeMetrics());
     return absl::OkStatus();
   }

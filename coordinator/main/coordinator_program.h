@@ -18,9 +18,12 @@ struct CoordinatorSettings {
   int threads = 1;                        // for acceptance and joining
   double lease_seconds = 30;
   double job_time_limit_seconds = 7200;
-  std::string rest_listen;     // host:port for HTTP; port 0 takes a free one; "": none
-  std::string page_folder;     // the dashboard's files; "": where they are installed, if they are
-  std::string api_token_file;  // what callers over HTTP have to show is in it; "": nothing
+  std::string rest_listen;                   // host:port for HTTP; port 0 takes a free one; "": none
+  std::string rest_tls_certificate_file;     // PEM; "": no TLS
+  std::string rest_tls_key_file;             // PEM
+  std::vector<std::string> trusted_proxies;  // addresses whose X-Forwarded-For is believed
+  std::string page_folder;                   // the dashboard's files; "": where they are installed, if they are
+  std::string api_token_file;                // what callers over HTTP have to show is in it; "": nothing
   std::string metrics_listen;  // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
 };
 

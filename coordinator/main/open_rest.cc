@@ -28,11 +28,18 @@ std::string FindPage() {
 
 absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& settings,
                                                      ReconstructionService& reconstructions, WorkerService& workers,
-                                                     BlobStore& blobs, JobStore& store) {
+                                                     BlobStore& blobs, JobStore& store, const Logger& log) {
   if (settings.rest_listen.empty()) return nullptr;
   RestOptions options = {.listen = settings.rest_listen,
                          .folder = settings.data_folder + "/rest",
                          .page_folder = settings.page_folder.empty() ? FindPage() : settings.page_folder};
+  if (settings.rest_tls_certificate_file.empty() != settings.rest_tls_key_file.empty()) {
+    return absl::InvalidArgumentError("rest-tls-cert and rest-tls-key: expected both or none");
+  }
+  options.tls_certificate_file = settings.rest_tls_certificate_file;
+  options.tls_key_file = settings.rest_tls_key_file;
+  options.trusted_proxies = {settings.trusted_proxies.begin(), settings.trusted_proxies.end()};
+  options.warn = [&log](const std::string& text) { log.Warning(text); };
   MW_ASSIGN_OR_RETURN(options.token, ReadApiToken(settings.api_token_file));
   RestServices services = {.reconstructions = &reconstructions,
                            .workers = &workers,

@@ -5,6 +5,7 @@
 #include <absl/status/statusor.h>
 
 #include "common/blob/blob_store.h"
+#include "common/telemetry/log.h"
 #include "coordinator/api/reconstruction_service.h"
 #include "coordinator/dispatch/worker_service.h"
 #include "coordinator/main/coordinator_program.h"
@@ -14,9 +15,9 @@
 namespace meshwright {
 
 // The REST interface as the settings ask for it; null when they ask for none. NotFound or InvalidArgument names the
-// setting.
+// setting. `log` outlives it.
 absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& settings,
                                                      ReconstructionService& reconstructions, WorkerService& workers,
-                                                     BlobStore& blobs, JobStore& store);
+                                                     BlobStore& blobs, JobStore& store, const Logger& log);
 
 }  // namespace meshwright

@@ -16,7 +16,7 @@ namespace {
 constexpr char kText[] = "text/plain; charset=utf-8";
 
 absl::Status Say(RestCall& call, const std::string& text, const char* type) {
-  call.response.set_content(text, type);
+  call.response.SetContent(text, type);
   return absl::OkStatus();
 }
 

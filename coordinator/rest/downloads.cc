@@ -24,7 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kPieceBytes = size_t{256} << 10;
 constexpr size_t kFilesKept = 8;
 
 std::string Quoted(const std::string& etag) { return absl::StrCat("\"", etag, "\""); }
@@ -81,7 +80,7 @@ ByteRange ParseByteRange(const std::string& header, int64_t size_bytes) {
 }
 
 bool HasCopy(const RestCall& call, const std::string& etag) {
-  const std::string header = call.request.get_header_value("If-None-Match");
+  const std::string header = call.request.headers.Get("If-None-Match");
   for (absl::string_view candidate : absl::StrSplit(header, ',')) {
     candidate = absl::StripAsciiWhitespace(candidate);
     absl::ConsumePrefix(&candidate, "W/");
@@ -92,19 +91,19 @@ bool HasCopy(const RestCall& call, const std::string& etag) {
 
 absl::Status SendFile(RestCall& call, std::shared_ptr<const OpenedFile> file, const std::string& etag,
                       const std::string& content_type, const std::string& name) {
-  call.response.set_header("ETag", Quoted(etag));
-  call.response.set_header("Accept-Ranges", "bytes");
-  call.response.set_header("Cache-Control", "no-cache");
+  call.response.headers.Set("ETag", Quoted(etag));
+  call.response.headers.Set("Accept-Ranges", "bytes");
+  call.response.headers.Set("Cache-Control", "no-cache");
   if (HasCopy(call, etag)) {
     call.response.status = 304;
     return absl::OkStatus();
   }
-  const std::string if_range = call.request.get_header_value("If-Range");
-  const std::string header = call.request.get_header_value("Range");
+  const std::string if_range = call.request.headers.Get("If-Range");
+  const std::string header = call.request.headers.Get("Range");
   const ByteRange range = if_range.empty() || if_range == Quoted(etag) ? ParseByteRange(header, file->size_bytes())
                                                                        : ParseByteRange("", file->size_bytes());
   if (range.kind == ByteRange::Kind::kUnsatisfiable) {
-    call.response.set_header("Content-Range", absl::StrCat("bytes */", file->size_bytes()));
+    call.response.headers.Set("Content-Range", absl::StrCat("bytes */", file->size_bytes()));
     return FieldError(
         "Range", HttpError(416, absl::OutOfRangeError(absl::StrCat("Range is \"", header.substr(0, 64),
                                                                    "\", expected bytes of ", file->size_bytes()))));
@@ -112,20 +111,21 @@ absl::Status SendFile(RestCall& call, std::shared_ptr<const OpenedFile> file, co
   call.response.status = 200;
   if (range.kind == ByteRange::Kind::kPart) {
     call.response.status = 206;
-    call.response.set_header("Content-Range", absl::StrCat("bytes ", range.first, "-", range.first + range.count - 1,
-                                                           "/", file->size_bytes()));
+    call.response.headers.Set("Content-Range", absl::StrCat("bytes ", range.first, "-", range.first + range.count - 1,
+                                                            "/", file->size_bytes()));
   }
-  call.response.set_header("Content-Disposition", absl::StrCat("attachment; filename=\"", name, "\""));
+  call.response.headers.Set("Content-Disposition", absl::StrCat("attachment; filename=\"", name, "\""));
   if (range.count == 0) {
-    call.response.set_content("", content_type);
+    call.response.SetContent("", content_type);
     return absl::OkStatus();
   }
-  call.response.set_content_provider(
-      static_cast<size_t>(range.count), content_type,
-      [file = std::move(file), first = range.first](size_t offset, size_t length, httplib::DataSink& sink) {
-        std::vector<char> piece(std::min(length, kPieceBytes));
-        const auto got = file->Read(first + static_cast<int64_t>(offset), piece.data(), piece.size());
-        return got.ok() && sink.write(piece.data(), *got);
+  call.response.SetPieces(
+      range.count, content_type,
+      [file = std::move(file), first = range.first](int64_t offset, size_t most) -> absl::StatusOr<std::string> {
+        std::string piece(most, '\0');
+        MW_ASSIGN_OR_RETURN(const size_t got, file->Read(first + offset, piece.data(), piece.size()));
+        piece.resize(got);
+        return piece;
       });
   return absl::OkStatus();
 }
@@ -137,10 +137,10 @@ absl::Status SendImmutable(RestCall& call, const std::string& etag, const std::s
   } else {
     MW_ASSIGN_OR_RETURN(const std::string bytes, make());
     call.response.status = 200;
-    call.response.set_content(bytes, content_type);
+    call.response.SetContent(bytes, content_type);
   }
-  call.response.set_header("ETag", Quoted(etag));
-  call.response.set_header("Cache-Control", "private, max-age=31536000, immutable");
+  call.response.headers.Set("ETag", Quoted(etag));
+  call.response.headers.Set("Cache-Control", "private, max-age=31536000, immutable");
   return absl::OkStatus();
 }
 

@@ -1,6 +1,7 @@
 #include "coordinator/rest/event_feeds.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -13,6 +14,7 @@ namespace {
 
 // So many events are handed to a client at a time, at most: what it does not read takes no more memory than that.
 constexpr size_t kEventsAtATime = 64;
+constexpr absl::Duration kLookAgainPerStream = absl::Microseconds(500);
 constexpr char kRetry[] = "retry: 2000\n\n";
 
 std::string Event(int64_t id, const char* name, const std::string& data) {
@@ -27,7 +29,12 @@ struct EventFeeds::Feed {
     SequenceNumber sequence = 0;
     std::string text;  // as it is sent, to whomever
   };
-  int watchers = 0;
+  void Wake() const {
+    for (const Stream* stream : streams) {
+      if (stream->wake_) stream->wake_();
+    }
+  }
+  std::set<const Stream*> streams;
   bool looked = false;
   int64_t version = 0;  // of `reconstruction`; 0: there is none yet
   std::string reconstruction;
@@ -49,8 +56,8 @@ void EventFeeds::Shutdown() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     stopping_ = true;
+    for (const auto& [id, feed] : feeds_) feed->Wake();
   }
-  news_.notify_all();
   wake_.notify_all();
 }
 
@@ -59,7 +66,8 @@ int EventFeeds::streams() const {
   return streams_;
 }
 
-absl::StatusOr<std::unique_ptr<EventFeeds::Stream>> EventFeeds::Open(const std::string& id, int64_t after_part) {
+absl::StatusOr<std::unique_ptr<EventFeeds::Stream>> EventFeeds::Open(const std::string& id, const std::string& caller,
+                                                                     int64_t after_part) {
   MW_RETURN_IF_ERROR(service_.Get(id).status());
   std::unique_ptr<Stream> stream;
   {
@@ -69,11 +77,17 @@ absl::StatusOr<std::unique_ptr<EventFeeds::Stream>> EventFeeds::Open(const std::
       return absl::UnavailableError(absl::StrCat("there are ", streams_, " event streams, expected fewer than ",
                                                  options_.max_streams, "; try again later"));
     }
+    int& has = streams_of_[caller];
+    if (has >= options_.max_streams_per_caller) {
+      return absl::ResourceExhaustedError(absl::StrCat("you have ", has, " event streams, expected fewer than ",
+                                                       options_.max_streams_per_caller, "; try again later"));
+    }
+    ++has;
+    ++streams_;
     std::shared_ptr<Feed>& feed = feeds_[id];
     if (feed == nullptr) feed = std::make_shared<Feed>();
-    ++feed->watchers;
-    ++streams_;
-    stream = std::unique_ptr<Stream>(new Stream(*this, id, feed, after_part));
+    stream = std::unique_ptr<Stream>(new Stream(*this, id, caller, feed, after_part));
+    feed->streams.insert(stream.get());
   }
   wake_.notify_all();
   return stream;
@@ -92,12 +106,16 @@ void EventFeeds::Run() {
              std::any_of(feeds_.begin(), feeds_.end(), [](const auto& entry) { return !entry.second->looked; });
     };
     if (changing) {
-      wake_.wait_for(lock, absl::ToChronoMilliseconds(options_.look_again), fresh);
+      wake_.wait_for(lock, absl::ToChronoMilliseconds(LookAgain()), fresh);
     } else {
       wake_.wait(lock, fresh);
     }
   }
 }
+
+// Each change is written to each stream: the more there are, the rarer, so that writing takes a bounded share of a
+// core.
+absl::Duration EventFeeds::LookAgain() const { return std::max(options_.look_again, streams_ * kLookAgainPerStream); }
 
 bool EventFeeds::Look(const std::string& id, Feed& feed) {
   int64_t committed = 0;
@@ -142,48 +160,51 @@ bool EventFeeds::Look(const std::string& id, Feed& feed) {
     } else {
       return true;
     }
+    feed.Wake();
   }
-  news_.notify_all();
   return !over;
 }
 
-EventFeeds::Stream::Stream(EventFeeds& feeds, std::string id, std::shared_ptr<Feed> feed, int64_t after_part)
-    : feeds_(feeds), id_(std::move(id)), feed_(std::move(feed)), last_part_(after_part) {}
+EventFeeds::Stream::Stream(EventFeeds& feeds, std::string id, std::string caller, std::shared_ptr<Feed> feed,
+                           int64_t after_part)
+    : feeds_(feeds), id_(std::move(id)), caller_(std::move(caller)), feed_(std::move(feed)), last_part_(after_part) {}
 
 EventFeeds::Stream::~Stream() {
   const std::lock_guard<std::mutex> lock(feeds_.mutex_);
   --feeds_.streams_;
-  if (--feed_->watchers > 0) return;
+  if (--feeds_.streams_of_[caller_] == 0) feeds_.streams_of_.erase(caller_);
+  feed_->streams.erase(this);
+  if (!feed_->streams.empty()) return;
   const auto found = feeds_.feeds_.find(id_);
   if (found != feeds_.feeds_.end() && found->second == feed_) feeds_.feeds_.erase(found);
 }
 
-std::string EventFeeds::Stream::Next() {
-  std::unique_lock<std::mutex> lock(feeds_.mutex_);
-  while (true) {
-    if (ended_ || feeds_.stopping_ || feed_->gone) return "";
-    std::string text;
-    if (feed_->version != told_version_) {
-      if (told_version_ == 0) text = kRetry;
-      told_version_ = feed_->version;
-      absl::StrAppend(&text, Event(last_part_, "reconstruction", feed_->reconstruction));
-    }
-    for (size_t count = 0; count < kEventsAtATime && next_part_ < feed_->parts.size(); ++next_part_) {
-      const Feed::PartEvent& part = feed_->parts[next_part_];
-      if (part.sequence <= last_part_) continue;
-      last_part_ = part.sequence;
-      text += part.text;
-      ++count;
-    }
-    if (feed_->over && next_part_ == feed_->parts.size()) {
-      absl::StrAppend(&text, Event(last_part_, "end", "{}"));
-      ended_ = true;
-    }
-    if (!text.empty()) return text;
-    if (feeds_.news_.wait_for(lock, absl::ToChronoMilliseconds(feeds_.options_.heartbeat)) == std::cv_status::timeout) {
-      return ":\n\n";
-    }
+void EventFeeds::Stream::SetWake(std::function<void()> wake) {
+  const std::lock_guard<std::mutex> lock(feeds_.mutex_);
+  wake_ = std::move(wake);
+}
+
+std::optional<std::string> EventFeeds::Stream::Next() {
+  const std::lock_guard<std::mutex> lock(feeds_.mutex_);
+  if (ended_ || feeds_.stopping_ || feed_->gone) return std::nullopt;
+  std::string text;
+  if (feed_->version != told_version_) {
+    if (told_version_ == 0) text = kRetry;
+    told_version_ = feed_->version;
+    absl::StrAppend(&text, Event(last_part_, "reconstruction", feed_->reconstruction));
   }
+  for (size_t count = 0; count < kEventsAtATime && next_part_ < feed_->parts.size(); ++next_part_) {
+    const Feed::PartEvent& part = feed_->parts[next_part_];
+    if (part.sequence <= last_part_) continue;
+    last_part_ = part.sequence;
+    text += part.text;
+    ++count;
+  }
+  if (feed_->over && next_part_ == feed_->parts.size()) {
+    absl::StrAppend(&text, Event(last_part_, "end", "{}"));
+    ended_ = true;
+  }
+  return text;
 }
 
 }  // namespace meshwright

@@ -2,9 +2,11 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -13,14 +15,15 @@
 #include <absl/status/statusor.h>
 #include <absl/time/time.h>
 
+#include "common/http_server/http_message.h"
 #include "coordinator/api/reconstruction_service.h"
 
 namespace meshwright {
 
 struct EventFeedOptions {
-  int max_streams = 200;  // clients at the same time
+  int max_streams = 2500;            // clients at the same time
+  int max_streams_per_caller = 250;  // so that one of them leaves places to the others
   absl::Duration look_again = absl::Milliseconds(250);
-  absl::Duration heartbeat = absl::Seconds(15);
 };
 
 // What happens to reconstructions, as server-sent events (WHATWG HTML, section 9.2) for any number of clients. One
@@ -32,34 +35,35 @@ class EventFeeds {
 
  public:
   EventFeeds(const ReconstructionService& service, const EventFeedOptions& options);
-  // Ends all streams.
+  // Ends all streams; none is left then.
   ~EventFeeds();
 
   // One client's stream. Destroying it makes room for another one.
-  class Stream {
+  class Stream final : public HttpEventSource {
    public:
-    ~Stream();
-    Stream(const Stream&) = delete;
-    Stream& operator=(const Stream&) = delete;
-
-    // Waits for events and returns their text; a comment when there are none for some time. "" ends the stream.
-    std::string Next();
+    ~Stream() override;
+    std::optional<std::string> Next() override;
+    std::string Heartbeat() override { return ":\n\n"; }
+    void SetWake(std::function<void()> wake) override;
 
    private:
     friend class EventFeeds;
-    Stream(EventFeeds& feeds, std::string id, std::shared_ptr<Feed> feed, int64_t after_part);
+    Stream(EventFeeds& feeds, std::string id, std::string caller, std::shared_ptr<Feed> feed, int64_t after_part);
 
     EventFeeds& feeds_;
     const std::string id_;
+    const std::string caller_;
     const std::shared_ptr<Feed> feed_;
+    std::function<void()> wake_;
     int64_t last_part_;
     size_t next_part_ = 0;
     int64_t told_version_ = 0;
     bool ended_ = false;
   };
 
-  // Parts up to the sequence number `after_part` are known. NotFound; Unavailable when there are too many streams.
-  absl::StatusOr<std::unique_ptr<Stream>> Open(const std::string& id, int64_t after_part);
+  // Parts up to the sequence number `after_part` are known. NotFound; Unavailable when there are too many streams,
+  // ResourceExhausted when `caller` has too many.
+  absl::StatusOr<std::unique_ptr<Stream>> Open(const std::string& id, const std::string& caller, int64_t after_part);
   // Ends all streams; none is opened any more.
   void Shutdown();
   int streams() const;
@@ -68,13 +72,14 @@ class EventFeeds {
   void Run();
   // Whether there may be news later.
   bool Look(const std::string& id, Feed& feed);
+  absl::Duration LookAgain() const;
 
   const ReconstructionService& service_;
   const EventFeedOptions options_;
   mutable std::mutex mutex_;
-  std::condition_variable news_;  // for streams
   std::condition_variable wake_;  // for the thread
   std::map<std::string, std::shared_ptr<Feed>> feeds_;
+  std::map<std::string, int> streams_of_;  // by caller
   int streams_ = 0;
   bool stopping_ = false;
   std::thread thread_;

@@ -123,8 +123,8 @@ TEST(OpenApiTest, EachRouteIsReached) {
   const RestContext context;
   const Router router(MakeRoutes(context));
   for (const Route& route : router.routes()) {
-    httplib::Request request;
-    httplib::Response response;
+    HttpRequest request;
+    HttpResponse response;
     request.method = route.method;
     request.path = std::regex_replace(route.path, std::regex("\\{[a-z]*\\}"), "7");
     RestCall call = {.request = request, .response = response};

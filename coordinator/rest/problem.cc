@@ -21,11 +21,12 @@ struct HttpTitle {
   int status;
   const char* title;
 };
-constexpr std::array<HttpTitle, 18> kTitles = {{{400, "Bad Request"},
+constexpr std::array<HttpTitle, 20> kTitles = {{{400, "Bad Request"},
                                                 {401, "Unauthorized"},
                                                 {403, "Forbidden"},
                                                 {404, "Not Found"},
-                                                {405, "ReconstructionConfig Not Allowed"},
+                                                {405, "Method Not Allowed"},
+                                                {408, "Request Timeout"},
                                                 {409, "Conflict"},
                                                 {411, "Length Required"},
                                                 {413, "Content Too Large"},
@@ -35,6 +36,7 @@ constexpr std::array<HttpTitle, 18> kTitles = {{{400, "Bad Request"},
                                                 {417, "Expectation Failed"},
                                                 {422, "Unprocessable Content"},
                                                 {429, "Too Many Requests"},
+                                                {431, "Request Header Fields Too Large"},
                                                 {500, "Internal Server Error"},
                                                 {501, "Not Implemented"},
                                                 {503, "Service Unavailable"},
@@ -143,21 +145,16 @@ std::string ProblemJson(const absl::Status& status) {
   return problem.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
-absl::Status StatusOfHttp(int http_status) {
-  const char* title = TitleOf(http_status);
-  switch (http_status) {
-    case 400:
-      return absl::InvalidArgumentError("the request cannot be read as HTTP/1.1");
-    case 404:
-      return absl::NotFoundError("there is nothing at this path");
-    case 414:
-      return HttpError(414, absl::InvalidArgumentError("the path is longer than anything that is there"));
-    case 416:
-      return FieldError("Range", HttpError(416, absl::OutOfRangeError("Range cannot be understood")));
-    default:
-      break;
-  }
-  return HttpError(http_status, http_status < 500 ? absl::InvalidArgumentError(title) : absl::InternalError(title));
+absl::Status StatusOfFault(const HttpFault& fault) {
+  absl::StatusCode code = fault.status < 500 ? absl::StatusCode::kInvalidArgument : absl::StatusCode::kInternal;
+  if (fault.status == 501) code = absl::StatusCode::kUnimplemented;
+  if (fault.status == 503) code = absl::StatusCode::kUnavailable;
+  std::string detail = fault.detail;
+  if (detail.empty()) detail = TitleOf(fault.status);
+  if (fault.detail.empty() && fault.status == 400) detail = "the request cannot be read as HTTP/1.1";
+  if (fault.detail.empty() && fault.status == 414) detail = "the path is longer than anything that is there";
+  const absl::Status status = HttpError(fault.status, absl::Status(code, detail));
+  return fault.field.empty() ? status : FieldError(fault.field, status);
 }
 
 }  // namespace meshwright

@@ -4,6 +4,8 @@
 
 #include <absl/status/status.h>
 
+#include "common/http_server/http_message.h"
+
 namespace meshwright {
 
 // Errors as REST tells them: problem details (RFC 9457) over absl::Status. What Status cannot say, the status of HTTP
@@ -20,7 +22,7 @@ int HttpStatusOf(const absl::Status& status);
 // message begins with ("weight is -1, expected ...").
 std::string ProblemJson(const absl::Status& status);
 
-// The status that the HTTP library set by itself, as a Status.
-absl::Status StatusOfHttp(int http_status);
+// What the server says by itself, as a Status.
+absl::Status StatusOfFault(const HttpFault& fault);
 
 }  // namespace meshwright

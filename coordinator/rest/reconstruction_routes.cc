@@ -21,34 +21,38 @@ constexpr int64_t kMaxSequence = 2'000'000'000;
 absl::Status Answer(RestCall& call, const absl::StatusOr<v1::Reconstruction>& reconstruction) {
   MW_RETURN_IF_ERROR(reconstruction.status());
   call.response.status = 200;
-  call.response.set_content(ToJson(*reconstruction), kJsonType);
+  call.response.SetContent(ToJson(*reconstruction), kJsonType);
   return absl::OkStatus();
 }
 
 absl::Status Create(const RestContext& context, RestCall& call) {
-  const std::string type = call.request.get_header_value("Content-Type");
+  const std::string type = call.request.headers.Get("Content-Type");
   if (!absl::StartsWithIgnoreCase(type, kJsonType)) {
     return HttpError(415, FieldError("Content-Type",
                                      absl::InvalidArgumentError(absl::StrCat("Content-Type is \"", type.substr(0, 64),
                                                                              "\", expected application/json"))));
   }
-  std::string body;
-  MW_RETURN_IF_ERROR(ReadContent(call, kMaxJsonBytes, [&](absl::Span<const uint8_t> bytes) {
-    body.append(bytes.begin(), bytes.end());
-    return absl::OkStatus();
-  }));
-  v1::CreateReconstructionRequest request;
-  MW_RETURN_IF_ERROR(FromJson(body, request));
-  return Answer(call, context.reconstructions->Create(request));
+  const auto body = std::make_shared<std::string>();
+  return TakeBody(
+      call, kMaxJsonBytes,
+      [body](absl::Span<const uint8_t> bytes) {
+        body->append(bytes.begin(), bytes.end());
+        return absl::OkStatus();
+      },
+      [&context, body](RestCall& taken) -> absl::Status {
+        v1::CreateReconstructionRequest request;
+        MW_RETURN_IF_ERROR(FromJson(*body, request));
+        return Answer(taken, context.reconstructions->Create(request));
+      });
 }
 
 absl::Status List(const RestContext& context, RestCall& call) {
   v1::ListReconstructionsRequest request;
   MW_ASSIGN_OR_RETURN(const int64_t page_size, QueryNumber(call, "pageSize", 0, 1000, 0));
   request.set_page_size(static_cast<int32_t>(page_size));
-  request.set_page_token(call.request.get_param_value("pageToken"));
+  request.set_page_token(call.request.Param("pageToken"));
   MW_ASSIGN_OR_RETURN(const v1::ListReconstructionsResponse response, context.reconstructions->List(request));
-  call.response.set_content(ToJson(response), kJsonType);
+  call.response.SetContent(ToJson(response), kJsonType);
   return absl::OkStatus();
 }
 
@@ -67,8 +71,8 @@ absl::Status Start(const RestContext& context, RestCall& call) {
 
 // The part that a client knows, 0 when it does not say.
 absl::StatusOr<int64_t> LastPart(const RestCall& call) {
-  if (!call.request.has_header("Last-Event-ID")) return QueryNumber(call, "lastEventId", 0, kMaxSequence, 0);
-  const std::string text = call.request.get_header_value("Last-Event-ID");
+  if (!call.request.headers.Has("Last-Event-ID")) return QueryNumber(call, "lastEventId", 0, kMaxSequence, 0);
+  const std::string text = call.request.headers.Get("Last-Event-ID");
   int64_t sequence = 0;
   if (!absl::SimpleAtoi(text, &sequence) || sequence < 0 || sequence > kMaxSequence) {
     return FieldError("Last-Event-ID",
@@ -80,33 +84,27 @@ absl::StatusOr<int64_t> LastPart(const RestCall& call) {
 
 absl::Status Events(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const int64_t last_part, LastPart(call));
-  auto opened = context.feeds->Open(call.path.at("id"), last_part);
-  if (absl::IsUnavailable(opened.status())) call.response.set_header("Retry-After", "5");
+  auto opened = context.feeds->Open(call.path.at("id"), call.request.caller, last_part);
+  if (absl::IsUnavailable(opened.status()) || absl::IsResourceExhausted(opened.status()))
+    call.response.headers.Set("Retry-After", "5");
   MW_RETURN_IF_ERROR(opened.status());
   call.response.status = 200;
-  call.response.set_header("Cache-Control", "no-store");
-  call.response.set_header("X-Accel-Buffering", "no");  // nginx would keep events back
-  call.response.set_chunked_content_provider(
-      "text/event-stream",
-      [stream = std::shared_ptr<EventFeeds::Stream>(*std::move(opened))](size_t, httplib::DataSink& sink) {
-        const std::string text = stream->Next();
-        if (!text.empty()) return sink.write(text.data(), text.size());
-        sink.done();
-        return true;
-      });
+  call.response.headers.Set("Cache-Control", "no-store");
+  call.response.headers.Set("X-Accel-Buffering", "no");  // nginx would keep events back
+  call.response.SetEvents("text/event-stream", *std::move(opened));
   return absl::OkStatus();
 }
 
 template <typename Response>
 absl::Status AnswerAny(RestCall& call, const absl::StatusOr<Response>& response) {
   MW_RETURN_IF_ERROR(response.status());
-  call.response.set_content(ToJson(*response), kJsonType);
+  call.response.SetContent(ToJson(*response), kJsonType);
   return absl::OkStatus();
 }
 
 absl::Status Cameras(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const nlohmann::ordered_json cameras, CamerasJson(*context.reconstructions, call.path.at("id")));
-  call.response.set_content(Dump(cameras), kJsonType);
+  call.response.SetContent(Dump(cameras), kJsonType);
   return absl::OkStatus();
 }
 
@@ -120,7 +118,7 @@ absl::Status Attempts(const RestContext& context, RestCall& call) {
 
 absl::Status Log(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const nlohmann::ordered_json log, LogJson(*context.reconstructions, call.path.at("id")));
-  call.response.set_content(Dump(log), kJsonType);
+  call.response.SetContent(Dump(log), kJsonType);
   return absl::OkStatus();
 }
 

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 
 #include <absl/status/status.h>
@@ -14,12 +15,18 @@
 namespace meshwright {
 
 struct RestOptions {
-  std::string listen;       // "host:port"; port 0 takes a free one
-  std::string folder;       // uploads that are not complete, converted meshes
-  std::string page_folder;  // the dashboard's files; "": none
-  std::string token;        // that callers have to show; "": none
-  int max_event_streams = 200;
+  std::string listen;                     // "host:port"; port 0 takes a free one
+  std::string folder;                     // uploads that are not complete, converted meshes
+  std::string page_folder;                // the dashboard's files; "": none
+  std::string token;                      // that callers have to show; "": none
+  std::string tls_certificate_file;       // PEM, read again when it changes; "": no TLS
+  std::string tls_key_file;               // PEM
+  std::set<std::string> trusted_proxies;  // addresses whose X-Forwarded-For is believed
+  int max_event_streams = 2500;
+  int max_event_streams_per_caller = 250;
   int idle_timeout_seconds = 10;  // clients that neither send nor take anything for so long are dropped
+  // Told in one line what no caller hears.
+  std::function<void(const std::string&)> warn = [](const std::string&) {};
 };
 
 // What the server is a shell over. All of it outlives the server.

@@ -33,7 +33,7 @@ absl::Status ListParts(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const int64_t after, QueryNumber(call, "after", 0, kMaxSequence, 0));
   MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts,
                       context.reconstructions->ListParts(call.path.at("id"), static_cast<SequenceNumber>(after)));
-  call.response.set_content(ToJson(parts), kJsonType);
+  call.response.SetContent(ToJson(parts), kJsonType);
   return absl::OkStatus();
 }
 
@@ -104,8 +104,8 @@ absl::Status SendPartialMesh(const RestContext& context, RestCall& call, const M
 
 absl::StatusOr<const MeshFormat*> QueryFormat(const RestCall& call) {
   constexpr char kName[] = "format";
-  if (!call.request.has_param(kName)) return &MeshFormats().front();
-  absl::StatusOr<const MeshFormat*> format = MeshFormatByName(call.request.get_param_value(kName));
+  if (!call.request.HasParam(kName)) return &MeshFormats().front();
+  absl::StatusOr<const MeshFormat*> format = MeshFormatByName(call.request.Param(kName));
   if (!format.ok()) return FieldError(kName, format.status());
   return format;
 }
@@ -133,7 +133,7 @@ absl::Status DownloadGlb(const RestContext& context, RestCall& call) {
 }
 
 absl::Status ListFormats(const RestContext& context, RestCall& call) {
-  call.response.set_content(DescribeMeshFormats(), kJsonType);
+  call.response.SetContent(DescribeMeshFormats(), kJsonType);
   return absl::OkStatus();
 }
 

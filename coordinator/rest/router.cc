@@ -17,7 +17,6 @@ namespace {
 
 constexpr char kRest[] = "{path}";
 constexpr size_t kQuoted = 64;
-constexpr int64_t kMaxDiscardedBytes = int64_t{4} << 20;
 
 std::vector<std::string> Segments(const std::string& path) { return absl::StrSplit(path, '/'); }
 
@@ -46,7 +45,7 @@ bool Fits(const std::vector<std::string>& pattern, const std::vector<std::string
   return true;
 }
 
-absl::Status CheckQuery(const Route& route, const httplib::Request& request) {
+absl::Status CheckQuery(const Route& route, const HttpRequest& request) {
   for (auto it = request.params.begin(); it != request.params.end(); ++it) {
     const std::string name = it->first.substr(0, kQuoted);
     if (std::find(route.query.begin(), route.query.end(), it->first) == route.query.end()) {
@@ -74,9 +73,32 @@ absl::StatusOr<int64_t> Number(const std::string& name, const std::string& text,
   return value;
 }
 
-absl::Status TooLarge(int64_t most) {
-  return HttpError(413, absl::InvalidArgumentError(absl::StrCat("the body has more than ", most, " bytes")));
-}
+class RestBody final : public HttpBodySink {
+ public:
+  RestBody(const RestCall& call, int64_t most, std::function<absl::Status(absl::Span<const uint8_t>)> take,
+           std::function<absl::Status(RestCall&)> finish)
+      : call_{.request = call.request, .response = call.response, .path = call.path},
+        most_(most),
+        take_(std::move(take)),
+        finish_(std::move(finish)) {}
+
+  int64_t max_bytes() const override { return most_; }
+  bool Take(absl::Span<const uint8_t> bytes) override {
+    status_ = take_(bytes);
+    return status_.ok();
+  }
+  void Finish(HttpExchange& exchange) override {
+    if (status_.ok()) status_ = finish_(call_);
+    AnswerStatus(status_, exchange.response);
+  }
+
+ private:
+  RestCall call_;
+  const int64_t most_;
+  const std::function<absl::Status(absl::Span<const uint8_t>)> take_;
+  const std::function<absl::Status(RestCall&)> finish_;
+  absl::Status status_;
+};
 
 }  // namespace
 
@@ -100,7 +122,7 @@ absl::StatusOr<const Route*> Router::Match(RestCall& call) const {
   }
   if (allowed.empty()) return absl::NotFoundError("there is nothing at this path");
   const std::string allow = absl::StrJoin(allowed, ", ");
-  call.response.set_header("Allow", allow);
+  call.response.headers.Set("Allow", allow);
   return HttpError(405,
                    absl::UnimplementedError(absl::StrCat("method is ", call.request.method, ", expected ", allow)));
 }
@@ -111,13 +133,13 @@ absl::StatusOr<int64_t> PathNumber(const RestCall& call, const std::string& name
 
 absl::StatusOr<int64_t> QueryNumber(const RestCall& call, const std::string& name, int64_t least, int64_t most,
                                     int64_t otherwise) {
-  if (!call.request.has_param(name)) return otherwise;
-  return Number(name, call.request.get_param_value(name), least, most);
+  if (!call.request.HasParam(name)) return otherwise;
+  return Number(name, call.request.Param(name), least, most);
 }
 
 absl::StatusOr<bool> QueryFlag(const RestCall& call, const std::string& name) {
-  if (!call.request.has_param(name)) return false;
-  const std::string text = call.request.get_param_value(name);
+  if (!call.request.HasParam(name)) return false;
+  const std::string text = call.request.Param(name);
   if (text != "true" && text != "false") {
     return FieldError(name, absl::InvalidArgumentError(
                                 absl::StrCat(name, " is \"", text.substr(0, kQuoted), "\", expected true or false")));
@@ -125,54 +147,23 @@ absl::StatusOr<bool> QueryFlag(const RestCall& call, const std::string& name) {
   return text == "true";
 }
 
-absl::Status ReadContent(RestCall& call, int64_t most,
-                         const std::function<absl::Status(absl::Span<const uint8_t>)>& take) {
-  if (call.content == nullptr) return absl::OkStatus();
-  call.content_read = true;
-  const std::string encoding = call.request.get_header_value("Content-Encoding");
-  // The library would take several parts apart, and would do so without a bound.
-  if ((!encoding.empty() && encoding != "identity") || call.request.is_multipart_form_data()) {
-    CloseAfterwards(call);
+absl::Status TakeBody(RestCall& call, int64_t most, std::function<absl::Status(absl::Span<const uint8_t>)> take,
+                      std::function<absl::Status(RestCall&)> finish) {
+  const std::string encoding = call.request.headers.Get("Content-Encoding");
+  const bool encoded = (!encoding.empty() && encoding != "identity") ||
+                       absl::StartsWithIgnoreCase(call.request.headers.Get("Content-Type"), "multipart/");
+  if (call.request.has_body && encoded) {
     return HttpError(415, absl::InvalidArgumentError("the body is encoded or in several parts, expected it as it is"));
   }
-  const std::string length_text = call.request.get_header_value("Content-Length");
-  if (!length_text.empty()) {
-    int64_t length = 0;
-    const bool digits = length_text.find_first_not_of("0123456789") == std::string::npos;
-    if (!digits || !absl::SimpleAtoi(length_text, &length)) {
-      CloseAfterwards(call);
-      return FieldError("Content-Length",
-                        absl::InvalidArgumentError(absl::StrCat("Content-Length is \"", length_text.substr(0, kQuoted),
-                                                                "\", expected a whole number")));
-    }
-    // The library would wait for all of it.
-    if (length > most + kMaxDiscardedBytes) {
-      CloseAfterwards(call);
-      return TooLarge(most);
-    }
-  }
-  absl::Status status;
-  int64_t received = 0;
-  int64_t discarded = 0;
-  const bool whole = (*call.content)([&](const char* bytes, size_t count) {
-    received += static_cast<int64_t>(count);
-    if (status.ok() && received > most) status = TooLarge(most);
-    if (status.ok()) status = take(absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes), count));
-    // Whoever is still sending would not hear why: what is left is taken, within limits.
-    if (!status.ok()) discarded += static_cast<int64_t>(count);
-    return discarded <= kMaxDiscardedBytes;
-  });
-  if (!whole) CloseAfterwards(call);
-  if (!status.ok()) return status;
-  if (whole) return absl::OkStatus();
-  return absl::InvalidArgumentError("the body ended early");
+  call.body = std::make_unique<RestBody>(call, most, std::move(take), std::move(finish));
+  return absl::OkStatus();
 }
 
-void CloseAfterwards(RestCall& call) {
-  // The library closes, and tells the client so, when the request asked for it; the request is not a constant object.
-  auto& headers = const_cast<httplib::Headers&>(call.request.headers);
-  headers.erase("Connection");
-  headers.emplace("Connection", "close");
+void AnswerStatus(const absl::Status& status, HttpResponse& response) {
+  if (status.ok()) return;
+  response.status = HttpStatusOf(status);
+  if (response.status == 401) response.headers.Set("WWW-Authenticate", "Bearer");
+  response.SetContent(ProblemJson(status), "application/problem+json");
 }
 
 }  // namespace meshwright

@@ -2,23 +2,24 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 #include <absl/types/span.h>
-#include <httplib.h>
+
+#include "common/http_server/http_message.h"
 
 namespace meshwright {
 
 // One request on its way through a handler.
 struct RestCall {
-  const httplib::Request& request;
-  httplib::Response& response;
-  const httplib::ContentReader* content = nullptr;  // null when the request has no body
-  std::map<std::string, std::string> path;          // what stands for {name} in the route's path
-  bool content_read = false;
+  const HttpRequest& request;
+  HttpResponse& response;
+  std::map<std::string, std::string> path;  // what stands for {name} in the route's path
+  std::unique_ptr<HttpBodySink> body;       // set by TakeBody
 };
 
 // Not OK: the answer is the problem.
@@ -54,12 +55,13 @@ absl::StatusOr<int64_t> QueryNumber(const RestCall& call, const std::string& nam
 // "true" or "false".
 absl::StatusOr<bool> QueryFlag(const RestCall& call, const std::string& name);
 
-// Hands the body to `take` in pieces. InvalidArgument when it ends early, HTTP status 413 above `most` bytes, 415 for
-// bodies that are encoded or in several parts.
-absl::Status ReadContent(RestCall& call, int64_t most,
-                         const std::function<absl::Status(absl::Span<const uint8_t>)>& take);
+// Asks for the request's body, which `take` then gets in pieces as they arrive; `finish` answers when it was all taken.
+// An error of either is the answer. HTTP status 415 for bodies that are encoded or in several parts; bodies above
+// `most` bytes get 413 by themselves.
+absl::Status TakeBody(RestCall& call, int64_t most, std::function<absl::Status(absl::Span<const uint8_t>)> take,
+                      std::function<absl::Status(RestCall&)> finish);
 
-// The connection ends with the answer: what the client goes on sending must not be taken for its next request.
-void CloseAfterwards(RestCall& call);
+// Makes `response` the problem that `status` is, if it is one.
+void AnswerStatus(const absl::Status& status, HttpResponse& response);
 
 }  // namespace meshwright

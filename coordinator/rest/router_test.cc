@@ -13,7 +13,7 @@ using testing::HasSubstr;
 class RouterTest : public testing::Test {
  protected:
   absl::StatusOr<std::string> Match(const std::string& method, const std::string& path,
-                                    const httplib::Params& params = {}) {
+                                    const std::multimap<std::string, std::string>& params = {}) {
     request_.method = method;
     request_.path = path;
     request_.params = params;
@@ -33,8 +33,8 @@ class RouterTest : public testing::Test {
       {"DELETE", "/things/{id}", {}},
       {"GET", "/things/{id}/files/{path}", {}},
   }};
-  httplib::Request request_;
-  httplib::Response response_;
+  HttpRequest request_;
+  HttpResponse response_;
   std::map<std::string, std::string> values_;
 };
 
@@ -54,7 +54,7 @@ TEST_F(RouterTest, TellsWrongPathsFromWrongMethods) {
   }
   const absl::Status wrong = Match("PUT", "/things/a7").status();
   EXPECT_EQ(HttpStatusOf(wrong), 405);
-  EXPECT_EQ(response_.get_header_value("Allow"), "DELETE, GET, HEAD");
+  EXPECT_EQ(response_.headers.Get("Allow"), "DELETE, GET, HEAD");
 }
 
 TEST_F(RouterTest, RefusesUnknownAndRepeatedParameters) {

@@ -29,10 +29,18 @@ nlohmann::ordered_json FileJson(const SceneFileState& file) {
 }
 
 absl::Status Answer(RestCall& call, const SceneFileState& file) {
-  call.response.set_header(kOffsetHeader, absl::StrCat(file.offset_bytes));
+  call.response.headers.Set(kOffsetHeader, absl::StrCat(file.offset_bytes));
   call.response.status = 200;
-  call.response.set_content(Dump(FileJson(file)), kJsonType);
+  call.response.SetContent(Dump(FileJson(file)), kJsonType);
   return absl::OkStatus();
+}
+
+// An error says in the header where to go on, if that is known.
+absl::Status WithOffset(HttpResponse& response, const absl::Status& status) {
+  if (const std::optional<int64_t> offset = ExpectedOffsetOf(status)) {
+    response.headers.Set(kOffsetHeader, absl::StrCat(*offset));
+  }
+  return status;
 }
 
 absl::Status ListFiles(const RestContext& context, RestCall& call) {
@@ -40,7 +48,7 @@ absl::Status ListFiles(const RestContext& context, RestCall& call) {
   nlohmann::ordered_json response;
   response["files"] = nlohmann::ordered_json::array();
   for (const SceneFileState& file : files) response["files"].push_back(FileJson(file));
-  call.response.set_content(Dump(response), kJsonType);
+  call.response.SetContent(Dump(response), kJsonType);
   return absl::OkStatus();
 }
 
@@ -56,14 +64,21 @@ absl::Status PutFile(const RestContext& context, RestCall& call) {
     return FieldError("size", absl::InvalidArgumentError("size is missing, expected the bytes of the whole file"));
   }
   MW_ASSIGN_OR_RETURN(part.offset_bytes, QueryNumber(call, "offset", 0, kMaxFileBytes, 0));
-  part.sha256 = call.request.get_param_value("sha256");
-  part.part_sha256 = call.request.get_param_value("partSha256");
-  int64_t expected_offset = -1;
-  const auto read = [&](const SceneUploads::Take& take) { return ReadContent(call, kMaxPartBytes, take); };
-  const absl::StatusOr<SceneFileState> file = context.uploads->Put(call.path.at("id"), part, read, &expected_offset);
-  if (!file.ok() && expected_offset >= 0) call.response.set_header(kOffsetHeader, absl::StrCat(expected_offset));
-  MW_RETURN_IF_ERROR(file.status());
-  return Answer(call, *file);
+  part.sha256 = call.request.Param("sha256");
+  part.part_sha256 = call.request.Param("partSha256");
+  auto begun = context.uploads->Begin(call.path.at("id"), part);
+  if (!begun.ok()) return WithOffset(call.response, begun.status());
+  const std::shared_ptr<ScenePartUpload> upload = *std::move(begun);
+  return TakeBody(
+      call, kMaxPartBytes,
+      [upload, &response = call.response](absl::Span<const uint8_t> bytes) {
+        return WithOffset(response, upload->Append(bytes));
+      },
+      [upload](RestCall& taken) -> absl::Status {
+        const absl::StatusOr<SceneFileState> file = upload->Finish();
+        MW_RETURN_IF_ERROR(WithOffset(taken.response, file.status()));
+        return Answer(taken, *file);
+      });
 }
 
 absl::Status Photo(const RestContext& context, RestCall& call) {

@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include <absl/strings/cord.h>
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <fcntl.h>
 #include <nlohmann/json.hpp>
@@ -24,59 +26,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr char kOffsetPayload[] = "meshwright/upload-offset";
 constexpr char kStateEnding[] = ".json";
 constexpr char kBytesEnding[] = ".part";
 constexpr size_t kPieceBytes = size_t{256} << 10;
 constexpr size_t kMaxPathLength = 1024;
-
-// The bytes of a file that is not complete.
-class PartialFile {
- public:
-  static absl::StatusOr<PartialFile> Open(const std::string& path) {
-    const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (descriptor < 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be kept");
-    return PartialFile(descriptor);
-  }
-  PartialFile(PartialFile&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
-  PartialFile& operator=(PartialFile&&) = delete;
-  PartialFile(const PartialFile&) = delete;
-  ~PartialFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-
-  absl::Status Write(absl::Span<const uint8_t> bytes, int64_t offset) {
-    while (!bytes.empty()) {
-      const ssize_t written = ::pwrite(descriptor_, bytes.data(), bytes.size(), offset);
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be kept");
-      bytes.remove_prefix(static_cast<size_t>(written));
-      offset += written;
-    }
-    return absl::OkStatus();
-  }
-  // As many bytes as there are, at most `count`.
-  absl::StatusOr<std::string> Read(int64_t offset, size_t count) const {
-    std::string bytes(count, '\0');
-    size_t done = 0;
-    while (done < count) {
-      const ssize_t got = ::pread(descriptor_, &bytes[done], count - done, offset + static_cast<int64_t>(done));
-      if (got < 0 && errno == EINTR) continue;
-      if (got < 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be read");
-      if (got == 0) break;
-      done += static_cast<size_t>(got);
-    }
-    bytes.resize(done);
-    return bytes;
-  }
-  absl::Status Sync() {
-    if (::fdatasync(descriptor_) != 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be kept");
-    return absl::OkStatus();
-  }
-
- private:
-  explicit PartialFile(int descriptor) : descriptor_(descriptor) {}
-  int descriptor_;
-};
 
 absl::Status CheckDigestText(const std::string& field, const std::string& text) {
   const bool good = text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
@@ -131,51 +85,63 @@ std::optional<SceneFileState> Load(const std::string& state_path) {
   return Decode(*text);
 }
 
-// Takes a part that is new: its bytes follow those that are there. Returns how many there were.
-absl::StatusOr<int64_t> TakeNew(const SceneFilePart& part, PartialFile& file, const SceneUploads::Read& read) {
-  Sha256Stream stream;
-  int64_t received = 0;
-  MW_RETURN_IF_ERROR(read([&](absl::Span<const uint8_t> bytes) -> absl::Status {
-    if (part.offset_bytes + received + static_cast<int64_t>(bytes.size()) > part.size_bytes) {
-      return FieldError("size", absl::InvalidArgumentError(
-                                    absl::StrCat("size is ", part.size_bytes, ", the part has bytes beyond it")));
-    }
-    MW_RETURN_IF_ERROR(file.Write(bytes, part.offset_bytes + received));
-    stream.Update(bytes);
-    received += static_cast<int64_t>(bytes.size());
-    return absl::OkStatus();
-  }));
-  const std::string digest = stream.HexDigest();
-  if (!part.part_sha256.empty()) {
-    if (digest != part.part_sha256) return WrongDigest("partSha256", part.part_sha256, digest);
-  } else if (received < part.size_bytes) {
-    return FieldError("partSha256", absl::InvalidArgumentError(absl::StrCat(
-                                        "partSha256 is missing, and the part has ", received, " of ", part.size_bytes,
-                                        " bytes: expected for a part that is not the whole file")));
-  }
-  MW_RETURN_IF_ERROR(file.Sync());
-  return received;
+absl::Status WithExpectedOffset(int64_t offset, absl::Status status) {
+  if (!status.ok()) status.SetPayload(kOffsetPayload, absl::Cord(absl::StrCat(offset)));
+  return status;
 }
 
-// A part that came before must say the bytes that are there.
-absl::Status CompareRepeated(const SceneFilePart& part, int64_t end_bytes, const PartialFile& file,
-                             const SceneUploads::Read& read) {
-  int64_t offset = part.offset_bytes;
-  return read([&](absl::Span<const uint8_t> bytes) -> absl::Status {
-    if (offset + static_cast<int64_t>(bytes.size()) > end_bytes) {
-      return FieldError("offset",
-                        absl::AbortedError(absl::StrCat("offset is ", part.offset_bytes, ", expected ", end_bytes)));
-    }
-    MW_ASSIGN_OR_RETURN(const std::string there, file.Read(offset, bytes.size()));
-    if (there.size() != bytes.size() || std::memcmp(there.data(), bytes.data(), bytes.size()) != 0) {
-      return absl::AbortedError("the part has other bytes than those that came before");
-    }
-    offset += static_cast<int64_t>(bytes.size());
-    return absl::OkStatus();
-  });
+absl::Status WrongOffset(int64_t offset, int64_t expected) {
+  return WithExpectedOffset(
+      expected, FieldError("offset", absl::AbortedError(absl::StrCat("offset is ", offset, ", expected ", expected))));
 }
 
 }  // namespace
+
+// The bytes of a file that is not complete.
+class PartialFile {
+ public:
+  static absl::StatusOr<std::unique_ptr<PartialFile>> Open(const std::string& path) {
+    const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (descriptor < 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be kept");
+    return std::unique_ptr<PartialFile>(new PartialFile(descriptor));
+  }
+  PartialFile(const PartialFile&) = delete;
+  PartialFile& operator=(const PartialFile&) = delete;
+  ~PartialFile() { ::close(descriptor_); }
+
+  absl::Status Write(absl::Span<const uint8_t> bytes, int64_t offset) {
+    while (!bytes.empty()) {
+      const ssize_t written = ::pwrite(descriptor_, bytes.data(), bytes.size(), offset);
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be kept");
+      bytes.remove_prefix(static_cast<size_t>(written));
+      offset += written;
+    }
+    return absl::OkStatus();
+  }
+  // As many bytes as there are, at most `count`.
+  absl::StatusOr<std::string> Read(int64_t offset, size_t count) const {
+    std::string bytes(count, '\0');
+    size_t done = 0;
+    while (done < count) {
+      const ssize_t got = ::pread(descriptor_, &bytes[done], count - done, offset + static_cast<int64_t>(done));
+      if (got < 0 && errno == EINTR) continue;
+      if (got < 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be read");
+      if (got == 0) break;
+      done += static_cast<size_t>(got);
+    }
+    bytes.resize(done);
+    return bytes;
+  }
+  absl::Status Sync() {
+    if (::fdatasync(descriptor_) != 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be kept");
+    return absl::OkStatus();
+  }
+
+ private:
+  explicit PartialFile(int descriptor) : descriptor_(descriptor) {}
+  const int descriptor_;
+};
 
 absl::StatusOr<std::unique_ptr<SceneUploads>> SceneUploads::Open(const std::string& folder,
                                                                  ReconstructionService& service) {
@@ -219,10 +185,10 @@ absl::Status SceneUploads::Deliver(const std::string& id, const SceneFileState& 
   header.set_size_bytes(state.size_bytes);
   header.set_sha256(state.sha256);
   MW_ASSIGN_OR_RETURN(SceneFileUpload upload, service_.BeginUpload(header));
-  MW_ASSIGN_OR_RETURN(const PartialFile file, PartialFile::Open(StatePath(id, state.path) + kBytesEnding));
+  MW_ASSIGN_OR_RETURN(const auto file, PartialFile::Open(StatePath(id, state.path) + kBytesEnding));
   Sha256Stream stream;
   for (int64_t offset = 0; offset < state.size_bytes;) {
-    MW_ASSIGN_OR_RETURN(const std::string piece, file.Read(offset, kPieceBytes));
+    MW_ASSIGN_OR_RETURN(const std::string piece, file->Read(offset, kPieceBytes));
     if (piece.empty()) break;  // the digest says so
     const std::string bytes = piece.substr(
         0, static_cast<size_t>(std::min<int64_t>(static_cast<int64_t>(piece.size()), state.size_bytes - offset)));
@@ -241,8 +207,7 @@ bool SceneUploads::HasTaken(const std::string& id, const SceneFileState& state) 
          std::find(taken->begin(), taken->end(), SceneFile{state.path, state.size_bytes, state.sha256}) != taken->end();
 }
 
-absl::StatusOr<SceneFileState> SceneUploads::Put(const std::string& id, const SceneFilePart& part, const Read& read,
-                                                 int64_t* expected_offset) {
+absl::StatusOr<std::unique_ptr<ScenePartUpload>> SceneUploads::Begin(const std::string& id, const SceneFilePart& part) {
   MW_RETURN_IF_ERROR(CheckTakesFiles(id));
   MW_RETURN_IF_ERROR(Check(part));
   const std::string state_path = StatePath(id, part.path);
@@ -252,54 +217,95 @@ absl::StatusOr<SceneFileState> SceneUploads::Put(const std::string& id, const Sc
       return absl::AbortedError(absl::StrCat("another part of ", part.path, " arrives at the same time"));
     }
   }
-  struct NotBusy {
-    SceneUploads& uploads;
-    const std::string& path;
-    ~NotBusy() {
-      const std::lock_guard<std::mutex> lock(uploads.mutex_);
-      uploads.busy_.erase(path);
-    }
-  } const not_busy{*this, state_path};
-
+  auto upload = std::unique_ptr<ScenePartUpload>(new ScenePartUpload(*this, id, part, state_path));
   std::error_code error;
   fs::create_directories(fs::path(state_path).parent_path(), error);
-  const std::string bytes_path = state_path + kBytesEnding;
   std::optional<SceneFileState> before = Load(state_path);
   // It may have been replaced by another way since.
   if (before && before->complete && !HasTaken(id, *before)) before.reset();
-  SceneFileState state = before.value_or(SceneFileState{.path = part.path});
+  SceneFileState& state = upload->state_;
+  state = before.value_or(SceneFileState{.path = part.path});
   const bool same_file = before && state.size_bytes == part.size_bytes && state.sha256 == part.sha256;
   if (same_file && state.complete) {
-    MW_RETURN_IF_ERROR(read([](absl::Span<const uint8_t>) { return absl::OkStatus(); }));
-    return state;
+    upload->kind_ = ScenePartUpload::Kind::kKnown;
+    return upload;
   }
   if (!same_file && part.offset_bytes == 0) {
     state = {.path = part.path, .size_bytes = part.size_bytes, .sha256 = part.sha256};
   }
-  *expected_offset = same_file || part.offset_bytes == 0 ? state.offset_bytes : 0;
-  if (part.offset_bytes > *expected_offset) {
-    return FieldError(
-        "offset", absl::AbortedError(absl::StrCat("offset is ", part.offset_bytes, ", expected ", *expected_offset)));
+  const int64_t expected = same_file || part.offset_bytes == 0 ? state.offset_bytes : 0;
+  if (part.offset_bytes > expected) return WrongOffset(part.offset_bytes, expected);
+  MW_ASSIGN_OR_RETURN(upload->file_, PartialFile::Open(state_path + kBytesEnding));
+  if (part.offset_bytes < state.offset_bytes) upload->kind_ = ScenePartUpload::Kind::kRepeated;
+  return upload;
+}
+
+ScenePartUpload::ScenePartUpload(SceneUploads& uploads, std::string id, SceneFilePart part, std::string state_path)
+    : uploads_(uploads), id_(std::move(id)), part_(std::move(part)), state_path_(std::move(state_path)) {}
+
+ScenePartUpload::~ScenePartUpload() {
+  const std::lock_guard<std::mutex> lock(uploads_.mutex_);
+  uploads_.busy_.erase(state_path_);
+}
+
+absl::Status ScenePartUpload::Append(absl::Span<const uint8_t> bytes) {
+  if (kind_ == Kind::kKnown) return absl::OkStatus();
+  const int64_t begin = part_.offset_bytes + received_bytes_;
+  received_bytes_ += static_cast<int64_t>(bytes.size());
+  const int64_t end = part_.offset_bytes + received_bytes_;
+  if (kind_ == Kind::kRepeated) {
+    if (end > state_.offset_bytes) return WrongOffset(part_.offset_bytes, state_.offset_bytes);
+    MW_ASSIGN_OR_RETURN(const std::string there, file_->Read(begin, bytes.size()));
+    if (there.size() == bytes.size() && std::memcmp(there.data(), bytes.data(), bytes.size()) == 0) {
+      return absl::OkStatus();
+    }
+    return WithExpectedOffset(state_.offset_bytes,
+                              absl::AbortedError("the part has other bytes than those that came before"));
   }
-  MW_ASSIGN_OR_RETURN(PartialFile file, PartialFile::Open(bytes_path));
-  if (part.offset_bytes < state.offset_bytes) {
-    MW_RETURN_IF_ERROR(CompareRepeated(part, state.offset_bytes, file, read));
-    return state;
+  if (end > part_.size_bytes) {
+    return WithExpectedOffset(state_.offset_bytes,
+                              FieldError("size", absl::InvalidArgumentError(absl::StrCat(
+                                                     "size is ", part_.size_bytes, ", the part has bytes beyond it"))));
   }
-  MW_ASSIGN_OR_RETURN(const int64_t received, TakeNew(part, file, read));
-  state.offset_bytes += received;
-  if (state.offset_bytes == state.size_bytes) {
-    const absl::Status delivered = Deliver(id, state);
-    if (HttpStatusOf(delivered) == 422) state.offset_bytes = 0;  // nobody knows which part was wrong
-    state.complete = delivered.ok();
-    MW_RETURN_IF_ERROR(Save(id, state));
-    *expected_offset = state.offset_bytes;
-    MW_RETURN_IF_ERROR(delivered);
-    fs::remove(bytes_path, error);
-    return state;
+  digest_.Update(bytes);
+  return file_->Write(bytes, begin);
+}
+
+absl::StatusOr<SceneFileState> ScenePartUpload::Finish() {
+  if (kind_ != Kind::kNew) return state_;
+  const std::string digest = digest_.HexDigest();
+  if (!part_.part_sha256.empty()) {
+    if (digest != part_.part_sha256) {
+      return WithExpectedOffset(state_.offset_bytes, WrongDigest("partSha256", part_.part_sha256, digest));
+    }
+  } else if (received_bytes_ < part_.size_bytes) {
+    return WithExpectedOffset(
+        state_.offset_bytes,
+        FieldError("partSha256", absl::InvalidArgumentError(absl::StrCat(
+                                     "partSha256 is missing, and the part has ", received_bytes_, " of ",
+                                     part_.size_bytes, " bytes: expected for a part that is not the whole file"))));
   }
-  MW_RETURN_IF_ERROR(Save(id, state));
-  return state;
+  MW_RETURN_IF_ERROR(file_->Sync());
+  state_.offset_bytes += received_bytes_;
+  if (state_.offset_bytes < state_.size_bytes) {
+    MW_RETURN_IF_ERROR(uploads_.Save(id_, state_));
+    return state_;
+  }
+  const absl::Status delivered = uploads_.Deliver(id_, state_);
+  if (HttpStatusOf(delivered) == 422) state_.offset_bytes = 0;  // nobody knows which part was wrong
+  state_.complete = delivered.ok();
+  MW_RETURN_IF_ERROR(uploads_.Save(id_, state_));
+  MW_RETURN_IF_ERROR(WithExpectedOffset(state_.offset_bytes, delivered));
+  std::error_code error;
+  fs::remove(state_path_ + kBytesEnding, error);
+  return state_;
+}
+
+std::optional<int64_t> ExpectedOffsetOf(const absl::Status& status) {
+  const auto payload = status.GetPayload(kOffsetPayload);
+  int64_t offset = 0;
+  if (!payload || !absl::SimpleAtoi(std::string(*payload), &offset)) return std::nullopt;
+  return offset;
 }
 
 absl::StatusOr<SceneFileState> SceneUploads::Get(const std::string& id, const std::string& path) const {

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -12,6 +12,7 @@
 #include <absl/status/statusor.h>
 #include <absl/types/span.h>
 
+#include "common/base/digest.h"
 #include "coordinator/api/reconstruction_service.h"
 
 namespace meshwright {
@@ -34,23 +35,52 @@ struct SceneFilePart {
   std::string part_sha256;  // "" when the part is the whole file
 };
 
+class SceneUploads;
+class PartialFile;
+
+// One part on its way. Destroying it without Finish() leaves the file as it was before.
+class ScenePartUpload {
+ public:
+  ~ScenePartUpload();
+  ScenePartUpload(const ScenePartUpload&) = delete;
+  ScenePartUpload& operator=(const ScenePartUpload&) = delete;
+
+  // Errors are as SceneUploads::Begin says.
+  absl::Status Append(absl::Span<const uint8_t> bytes);
+  absl::StatusOr<SceneFileState> Finish();
+
+ private:
+  friend class SceneUploads;
+  enum class Kind {
+    kNew,       // its bytes follow those that are there
+    kRepeated,  // it must say the bytes that are there
+    kKnown,     // the reconstruction has the file
+  };
+  ScenePartUpload(SceneUploads& uploads, std::string id, SceneFilePart part, std::string state_path);
+
+  SceneUploads& uploads_;
+  const std::string id_;
+  const SceneFilePart part_;
+  const std::string state_path_;
+  Kind kind_ = Kind::kNew;
+  SceneFileState state_;
+  std::unique_ptr<PartialFile> file_;
+  Sha256Stream digest_;  // of the part
+  int64_t received_bytes_ = 0;
+};
+
 // Files of scenes that arrive in parts, each with its digest, over any number of connections and restarts. What is
 // incomplete lies in a folder of its own; a complete file goes to the reconstruction as any other upload does.
 // Thread-safe.
 class SceneUploads {
  public:
-  using Take = std::function<absl::Status(absl::Span<const uint8_t>)>;
-  // Hands over the part's bytes in pieces; errors of `take` are released.
-  using Read = std::function<absl::Status(const Take& take)>;
-
   // Makes the folder when it is not there.
   static absl::StatusOr<std::unique_ptr<SceneUploads>> Open(const std::string& folder, ReconstructionService& service);
 
-  // Errors beside those of `read` and of the reconstruction: InvalidArgument for fields; Aborted when the part begins
-  // elsewhere than the one before ended, says other bytes than those that are there, or comes at the same time as
-  // another one, `*expected_offset` then says where to go on; HTTP status 422 for digests.
-  absl::StatusOr<SceneFileState> Put(const std::string& id, const SceneFilePart& part, const Read& read,
-                                     int64_t* expected_offset);
+  // Errors of it and of its parts, beside those of the reconstruction: InvalidArgument for fields; Aborted when the
+  // part begins elsewhere than the one before ended, says other bytes than those that are there, or comes at the same
+  // time as another one; HTTP status 422 for digests. ExpectedOffsetOf() tells where to go on. It outlives its parts.
+  absl::StatusOr<std::unique_ptr<ScenePartUpload>> Begin(const std::string& id, const SceneFilePart& part);
   absl::StatusOr<SceneFileState> Get(const std::string& id, const std::string& path) const;
   // Those begun here and those that the reconstruction has, by path; none once it was started.
   absl::StatusOr<std::vector<SceneFileState>> List(const std::string& id) const;
@@ -58,6 +88,7 @@ class SceneUploads {
   void Sweep() const;
 
  private:
+  friend class ScenePartUpload;
   SceneUploads(std::string folder, ReconstructionService& service) : folder_(std::move(folder)), service_(service) {}
 
   absl::Status CheckTakesFiles(const std::string& id) const;
@@ -71,5 +102,8 @@ class SceneUploads {
   std::mutex mutex_;
   std::set<std::string> busy_;  // state paths of the files that a part arrives for
 };
+
+// Where a file that an error is about should go on, if that is known.
+std::optional<int64_t> ExpectedOffsetOf(const absl::Status& status);
 
 }  // namespace meshwright

@@ -78,7 +78,7 @@ absl::Status SendPage(RestCall& call, const std::string& folder) {
   if (folder.empty() || !LiesBelow(folder + "/index.html", folder)) {
     if (!path.empty()) return absl::NotFoundError("there is nothing at this path");
     call.response.status = 200;
-    call.response.set_content(kNoPage, "text/plain; charset=utf-8");
+    call.response.SetContent(kNoPage, "text/plain; charset=utf-8");
     return absl::OkStatus();
   }
   std::string file = path.empty() ? "index.html" : path;
@@ -93,16 +93,16 @@ absl::Status SendPage(RestCall& call, const std::string& folder) {
   }
   MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(absl::StrCat(folder, "/", file)));
   const std::string etag = Sha256Hex(bytes).substr(0, 32);
-  call.response.set_header("ETag", absl::StrCat("\"", etag, "\""));
-  call.response.set_header("Cache-Control",
-                           absl::StartsWith(file, "assets/") ? "public, max-age=31536000, immutable" : "no-cache");
-  call.response.set_header("Content-Security-Policy", kPolicy);
+  call.response.headers.Set("ETag", absl::StrCat("\"", etag, "\""));
+  call.response.headers.Set("Cache-Control",
+                            absl::StartsWith(file, "assets/") ? "public, max-age=31536000, immutable" : "no-cache");
+  call.response.headers.Set("Content-Security-Policy", kPolicy);
   if (HasCopy(call, etag)) {
     call.response.status = 304;
     return absl::OkStatus();
   }
   call.response.status = 200;
-  call.response.set_content(bytes, TypeOf(file));
+  call.response.SetContent(bytes, TypeOf(file));
   return absl::OkStatus();
 }
 
