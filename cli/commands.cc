@@ -7,6 +7,8 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include "pipeline/cameras/photograph_folder.h"
+
 #include "common/base/bad_input.h"
 #include "common/scene/formats/formats.h"
 #include "common/scene/formats/import.h"
@@ -42,7 +44,16 @@ void AddThreadsOption(CLI::App& command, int& threads) {
 
 int AvailableCores() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
+bool LacksCameras(const SceneArguments& arguments) {
+  return !arguments.import.format.has_value() && !HoldsScene(arguments.path) && HoldsPhotographs(arguments.path);
+}
+
 absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments) {
+  if (LacksCameras(arguments)) {
+    return BadInput(
+        absl::InvalidArgumentError(absl::StrCat(arguments.path, ": photographs without cameras; meshwright cameras ",
+                                                arguments.path, " -o SCENE makes a scene")));
+  }
   absl::StatusOr<Scene> scene = ImportScene(arguments.path, arguments.import);
   if (!scene.ok()) return BadInput(scene.status());
   for (const std::string& warning : scene->warnings) Warn(warning);

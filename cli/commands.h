@@ -18,6 +18,7 @@ namespace meshwright {
 // user chose it.
 using Run = std::function<int()>;
 void AddReconstructCommand(CLI::App& program, Run& run);
+void AddCamerasCommand(CLI::App& program, Run& run);
 void AddInspectCommand(CLI::App& program, Run& run);
 // evaluate, synthesize, render: they need tools/, and a build without it has commands of these names that say so.
 void AddToolCommands(CLI::App& program, Run& run);
@@ -48,5 +49,8 @@ void AddThreadsOption(CLI::App& command, int& threads);
 int AvailableCores();
 // Errors are bad input. What was left out of the scene is said on stderr, a line each.
 absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments);
+
+// Photographs and nothing that tells their cameras.
+bool LacksCameras(const SceneArguments& arguments);
 
 }  // namespace meshwright

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   KeepMemoryLow();
   IgnoreFileSizeSignal();
   CLI::App program(
-      "Meshwright turns photographs with known cameras into a triangle mesh (Jancosek, Shekhovtsov, "
+      "Meshwright turns photographs into a triangle mesh (Jancosek, Shekhovtsov, "
       "Pajdla: Scalable Multi-View Stereo, 2009).",
       "meshwright");
   program.set_version_flag("--version", absl::StrCat("meshwright ", MW_VERSION));
@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done, 1 failed, 2 wrong use, 3 bad input.");
   Run run;
   AddReconstructCommand(program, run);
+  AddCamerasCommand(program, run);
   AddInspectCommand(program, run);
   AddConvertCommand(program, run);
   AddTextureCommand(program, run);

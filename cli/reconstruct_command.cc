@@ -10,6 +10,7 @@
 #include "pipeline/local/local_reconstruction.h"
 #include "pipeline/options/option_table.h"
 
+#include "cli/camera_stage.h"
 #include "cli/commands.h"
 #include "cli/loss_follower.h"
 #include "cli/progress_display.h"
@@ -21,6 +22,7 @@ namespace meshwright {
 namespace {
 
 constexpr char kExamples[] = R"(Examples:
+  meshwright reconstruct photographs -o mesh.ply
   meshwright reconstruct scene -o mesh.ply
   meshwright reconstruct scene -o model.glb                    # simplified, with a texture
   meshwright reconstruct fountain-P11 -o fountain.ply --max-image-size 1536
@@ -72,6 +74,19 @@ void PrintSummary(const nlohmann::ordered_json& report, const LocalSettings& set
               FormatBytes(process["peak_memory_bytes"].get<double>()).c_str());
 }
 
+// The cameras stay beside the mesh when it is done: another mesh of the same photographs need not wait for them again.
+int EstimateCamerasFirst(Arguments& arguments) {
+  CameraEstimationSettings settings;
+  settings.photographs = arguments.scene.path;
+  settings.scene_folder = BesideOutput(arguments.settings.output_path, ".cameras");
+  settings.threads = arguments.settings.threads;
+  settings.restart = arguments.settings.restart;
+  CameraEstimate estimate;
+  const int code = RunCameraStage(settings, arguments.output, &estimate);
+  arguments.scene.path = settings.scene_folder;
+  return code;
+}
+
 int Reconstruct(Arguments& arguments) {
   LocalSettings& settings = arguments.settings;
   if (const absl::Status valid = CheckOptions(arguments.options, "--"); !valid.ok()) {
@@ -95,6 +110,9 @@ int Reconstruct(Arguments& arguments) {
   const int64_t mebibytes = arguments.memory_mib > 0 ? arguments.memory_mib : DefaultMemoryMib(settings.threads);
   settings.memory_limit_bytes = mebibytes << 20;
 
+  if (LacksCameras(arguments.scene)) {
+    if (const int code = EstimateCamerasFirst(arguments); code != kExitDone) return code;
+  }
   const absl::StatusOr<Scene> scene = LoadScene(arguments.scene);
   if (!scene.ok()) return Fail(scene.status());
   std::signal(SIGINT, OnStopSignal);
@@ -136,9 +154,13 @@ int Reconstruct(Arguments& arguments) {
 void AddReconstructCommand(CLI::App& program, Run& run) {
   auto arguments = std::make_shared<Arguments>();
   arguments->settings.threads = AvailableCores();
-  CLI::App& command = *program.add_subcommand("reconstruct", "Turn photographs with known cameras into a mesh");
+  CLI::App& command = *program.add_subcommand("reconstruct", "Turn photographs into a mesh");
   command.footer(kExamples);
-  command.add_option("SCENE", arguments->scene.path, "folder with cameras and photographs")->required();
+  command
+      .add_option(
+          "SCENE", arguments->scene.path,
+          "folder with photographs and their cameras; without cameras COLMAP estimates them, into OUTPUT.cameras/")
+      ->required();
   command
       .add_option("-o,--output", arguments->settings.output_path,
                   absl::StrCat("the mesh to write; its ending says the format: ", MeshFormatEndings()))

@@ -13,6 +13,7 @@
 #include "pipeline/options/option_table.h"
 #include "pipeline/options/options_json.h"
 
+#include "cli/camera_stage.h"
 #include "cli/commands.h"
 #include "cli/mesh_output.h"
 #include "cli/reconstruction_flags.h"
@@ -26,6 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kExamples[] = R"(Examples:
+  meshwright submit photographs -o mesh.ply         # estimate their cameras here, upload, wait, download the mesh
   meshwright submit my-scene -o mesh.ply            # upload it, wait, download the mesh
   meshwright submit my-scene --id first-try         # upload it; then: meshwright watch first-try
   meshwright submit file:campaign/7 --wait          # a folder below the coordinator's --scene-root)";
@@ -60,9 +62,11 @@ std::string DrawId(const std::string& scene) {
 absl::StatusOr<std::vector<std::string>> FilesOf(const std::string& folder) {
   std::vector<std::string> files;
   std::error_code error;
-  for (auto it = fs::recursive_directory_iterator(folder, error); it != fs::recursive_directory_iterator();
-       it.increment(error)) {
-    if (error) break;
+  constexpr int kDeepest = 8;  // links may go in circles
+  // images/ of a scene that COLMAP made is a link to the photographs.
+  auto it = fs::recursive_directory_iterator(folder, fs::directory_options::follow_directory_symlink, error);
+  for (; !error && it != fs::recursive_directory_iterator(); it.increment(error)) {
+    if (it.depth() >= kDeepest) it.disable_recursion_pending();
     if (absl::StartsWith(it->path().filename().string(), ".")) {
       if (it->is_directory()) it.disable_recursion_pending();
     } else if (it->is_regular_file() && it->path().extension() != ".ply") {
@@ -86,6 +90,20 @@ absl::Status Upload(const Arguments& arguments, ServiceClient& client) {
   return absl::OkStatus();
 }
 
+// The scene that COLMAP makes of photographs stays beside them: submitting them again need not wait for it.
+int EstimateCamerasFirst(Arguments& arguments) {
+  fs::path photographs = fs::path(arguments.scene.path).lexically_normal();
+  if (!photographs.has_filename()) photographs = photographs.parent_path();
+  CameraEstimationSettings settings;
+  settings.photographs = photographs.string();
+  settings.scene_folder = photographs.string() + ".cameras";
+  settings.threads = AvailableCores();
+  CameraEstimate estimate;
+  const int code = RunCameraStage(settings, arguments.service.output, &estimate);
+  arguments.scene.path = settings.scene_folder;
+  return code;
+}
+
 int Submit(Arguments& arguments) {
   if (const absl::Status valid = CheckOptions(arguments.options, "--"); !valid.ok()) {
     return FailWrongUse(std::string(valid.message()));
@@ -96,11 +114,14 @@ int Submit(Arguments& arguments) {
     }
   }
   const bool by_reference = absl::StartsWith(arguments.scene.path, kByReference);
+  if (arguments.id.empty()) arguments.id = DrawId(arguments.scene.path);
+  if (!by_reference && LacksCameras(arguments.scene)) {
+    if (const int code = EstimateCamerasFirst(arguments); code != kExitDone) return code;
+  }
   if (!by_reference) {
     // Better known here and now than after it was uploaded.
     if (const auto scene = LoadScene(arguments.scene); !scene.ok()) return Fail(scene.status());
   }
-  if (arguments.id.empty()) arguments.id = DrawId(arguments.scene.path);
   const auto client = arguments.service.Connect();
   v1::CreateReconstructionRequest request;
   request.set_id(arguments.id);
@@ -137,8 +158,10 @@ void AddSubmitCommand(CLI::App& program, Run& run) {
   CLI::App& command = *program.add_subcommand("submit", "Have a scene reconstructed by a coordinator and its workers");
   command.footer(kExamples);
   command
-      .add_option("SCENE", arguments->scene.path,
-                  "folder with cameras and photographs, to be uploaded; or file:FOLDER below the coordinator's roots")
+      .add_option(
+          "SCENE", arguments->scene.path,
+          "folder with photographs and their cameras, to be uploaded; without cameras COLMAP estimates them here, into "
+          "SCENE.cameras/; or file:FOLDER below the coordinator's roots")
       ->required();
   command.add_option(
       "--id", arguments->id,

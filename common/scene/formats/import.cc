@@ -1,5 +1,6 @@
 #include "common/scene/formats/import.h"
 
+#include <algorithm>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -66,6 +67,11 @@ absl::StatusOr<Scene> ImportScene(const std::string& path, const ImportOptions& 
   absl::StatusOr<Scene> scene = taken->import(taken_at, options);
   if (scene.ok()) scene->warnings.insert(scene->warnings.end(), warnings.begin(), warnings.end());
   return scene;
+}
+
+bool HoldsScene(const std::string& path) {
+  return std::any_of(SceneFormats().begin(), SceneFormats().end(),
+                     [&](const SceneFormat& format) { return !format.find(path).empty(); });
 }
 
 }  // namespace meshwright

@@ -17,4 +17,7 @@ namespace meshwright {
 // are missing), InvalidArgument (anything else that is wrong with the scene).
 absl::StatusOr<Scene> ImportScene(const std::string& path, const ImportOptions& options = {});
 
+// Whether the folder `path` has what one of the formats looks for.
+bool HoldsScene(const std::string& path);
+
 }  // namespace meshwright

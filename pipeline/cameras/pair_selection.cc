@@ -1,0 +1,80 @@
+#include "pipeline/cameras/pair_selection.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <filesystem>
+
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+
+namespace meshwright {
+namespace {
+
+constexpr size_t kMostForEachWithEach = 200;
+// Videos are taken apart with a stride, and people delete blurred frames.
+constexpr int64_t kLargestGapPerFrame = 60;
+
+constexpr struct {
+  PairSelection selection;
+  const char* name;
+} kNames[] = {{PairSelection::kExhaustive, "exhaustive"},
+              {PairSelection::kSequential, "sequential"},
+              {PairSelection::kVocabularyTree, "vocabulary-tree"}};
+
+struct NumberedName {
+  std::string prefix;
+  int64_t number = -1;  // -1: none at its end
+};
+
+NumberedName SplitName(const std::string& name) {
+  const std::string stem = std::filesystem::path(name).replace_extension().string();
+  size_t begin = stem.size();
+  while (begin > 0 && std::isdigit(static_cast<unsigned char>(stem[begin - 1])) != 0) --begin;
+  NumberedName split{.prefix = stem.substr(0, begin)};
+  if (!absl::SimpleAtoi(stem.substr(begin), &split.number)) split.number = -1;
+  return split;
+}
+
+bool AreVideoFrames(const std::vector<Photograph>& photographs) {
+  const NumberedName first = SplitName(photographs.front().name);
+  const bool alike = std::all_of(photographs.begin(), photographs.end(), [&](const Photograph& photograph) {
+    const NumberedName name = SplitName(photograph.name);
+    return name.number >= 0 && name.prefix == first.prefix && photograph.exif == ExifCamera() &&
+           photograph.size.width == photographs.front().size.width &&
+           photograph.size.height == photographs.front().size.height;
+  });
+  if (!alike) return false;
+  const int64_t span = SplitName(photographs.back().name).number - first.number;
+  return span < kLargestGapPerFrame * static_cast<int64_t>(photographs.size());
+}
+
+}  // namespace
+
+std::string NameOf(PairSelection selection) {
+  for (const auto& entry : kNames) {
+    if (entry.selection == selection) return entry.name;
+  }
+  return "";
+}
+
+std::optional<PairSelection> PairSelectionOfName(std::string_view name) {
+  for (const auto& entry : kNames) {
+    if (name == entry.name) return entry.selection;
+  }
+  return std::nullopt;
+}
+
+ChosenPairs ChoosePairs(const std::vector<Photograph>& photographs) {
+  const size_t count = photographs.size();
+  if (count <= kMostForEachWithEach) {
+    return {PairSelection::kExhaustive, absl::StrCat("each with each, as there are only ", count)};
+  }
+  if (AreVideoFrames(photographs)) {
+    return {PairSelection::kSequential, "each with those that follow and those that look alike: frames of a video"};
+  }
+  return {PairSelection::kVocabularyTree,
+          absl::StrCat("each with those that look alike, as each with each of ", count, " would take too long")};
+}
+
+}  // namespace meshwright
