@@ -24,7 +24,7 @@ const std::vector<std::string>& KnownNames() {
       // meshwright, meshwright-coordinator, meshwright-worker
       "api-token-file", "blobs", "config", "coordinator", "coordinator-threads", "cores", "dashboard", "data",
       "drain-seconds", "job-time-limit-seconds", "lease-seconds", "listen", "memory", "metrics-listen", "rest-listen",
-      "scene-root", "store", "worker-id",
+      "rest-tls-cert", "rest-tls-key", "trusted-proxy", "scene-root", "store", "worker-id",
       // docker-compose.yml
       "grafana-password", "grafana-port", "port", "postgres-password", "prometheus-port", "rest-port", "scenes",
       "worker-cores", "workers",

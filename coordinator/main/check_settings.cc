@@ -66,6 +66,9 @@ absl::Status CheckSettings(const CoordinatorSettings& settings) {
   MW_RETURN_IF_ERROR(CheckBlobs(settings.blobs));
   for (const std::string& root : settings.scene_roots) MW_RETURN_IF_ERROR(CheckFolder(root, "--scene-root"));
   MW_RETURN_IF_ERROR(CheckPage(settings.page_folder));
+  if (settings.rest_tls_certificate_file.empty() != settings.rest_tls_key_file.empty()) {
+    return absl::InvalidArgumentError("--rest-tls-cert and --rest-tls-key: expected both or none");
+  }
   return ReadApiToken(settings.api_token_file).status();
 }
 

@@ -33,9 +33,6 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
   RestOptions options = {.listen = settings.rest_listen,
                          .folder = settings.data_folder + "/rest",
                          .page_folder = settings.page_folder.empty() ? FindPage() : settings.page_folder};
-  if (settings.rest_tls_certificate_file.empty() != settings.rest_tls_key_file.empty()) {
-    return absl::InvalidArgumentError("rest-tls-cert and rest-tls-key: expected both or none");
-  }
   options.tls_certificate_file = settings.rest_tls_certificate_file;
   options.tls_key_file = settings.rest_tls_key_file;
   options.trusted_proxies = {settings.trusted_proxies.begin(), settings.trusted_proxies.end()};
