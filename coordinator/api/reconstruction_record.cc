@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include "coordinator/dispatch/proto_times.h"
@@ -18,6 +19,11 @@ constexpr std::pair<const char*, v1::AttemptEnding> kEndings[] = {{"finished", v
                                                                   {"released", v1::ATTEMPT_ENDING_RELEASED}};
 
 }  // namespace
+
+std::string InWords(v1::ReconstructionState state) {
+  constexpr char kPrefix[] = "RECONSTRUCTION_STATE_";
+  return absl::AsciiStrToLower(v1::ReconstructionState_Name(state).substr(sizeof(kPrefix) - 1));
+}
 
 v1::ReconstructionState ToProto(ReconstructionState state) {
   switch (state) {

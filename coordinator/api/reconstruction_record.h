@@ -11,6 +11,8 @@
 namespace meshwright {
 
 v1::ReconstructionState ToProto(ReconstructionState state);
+// "cancelled": as messages say it.
+std::string InWords(v1::ReconstructionState state);
 // All that the store knows of a reconstruction.
 v1::Reconstruction ToProto(const Reconstruction& reconstruction);
 v1::Attempt ToProto(const std::string& reconstruction, const Attempt& attempt);

@@ -7,7 +7,6 @@
 #include <set>
 #include <utility>
 
-#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include "common/base/status_macros.h"
@@ -30,10 +29,8 @@ constexpr int kMaxAttempts = 100'000;
 constexpr int kLooksPerLease = 4;
 
 absl::Status WrongState(const Reconstruction& stored, const char* expected) {
-  constexpr char kPrefix[] = "RECONSTRUCTION_STATE_";
-  const std::string state = v1::ReconstructionState_Name(ToProto(stored.state)).substr(sizeof(kPrefix) - 1);
   return absl::FailedPreconditionError(
-      absl::StrCat("reconstruction ", stored.id, " is ", absl::AsciiStrToLower(state), ", expected ", expected));
+      absl::StrCat("reconstruction ", stored.id, " is ", InWords(ToProto(stored.state)), ", expected ", expected));
 }
 
 v1::CameraState CameraStateOf(CameraJobState state, bool committed) {

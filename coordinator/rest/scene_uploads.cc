@@ -18,6 +18,7 @@
 #include "common/base/files.h"
 #include "common/base/relative_path.h"
 #include "common/base/status_macros.h"
+#include "coordinator/api/reconstruction_record.h"
 #include "coordinator/api/scene_upload.h"
 #include "coordinator/rest/problem.h"
 
@@ -163,9 +164,8 @@ std::string SceneUploads::StatePath(const std::string& id, const std::string& pa
 absl::Status SceneUploads::CheckTakesFiles(const std::string& id) const {
   MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, service_.Get(id));
   if (reconstruction.state() != v1::RECONSTRUCTION_STATE_CREATED) {
-    return absl::FailedPreconditionError(absl::StrCat("reconstruction ", id, " is ",
-                                                      v1::ReconstructionState_Name(reconstruction.state()),
-                                                      ", expected one not started"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("reconstruction ", id, " is ", InWords(reconstruction.state()), ", expected one not started"));
   }
   if (!reconstruction.scene_reference().empty()) {
     return absl::FailedPreconditionError(
