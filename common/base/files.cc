@@ -62,8 +62,13 @@ absl::StatusOr<std::string> ReplaceableFile(const std::string& path) {
         path, ": ", fs::is_directory(status) ? "a folder" : "a device or pipe", "; the name of a file expected"));
   }
   if (!fs::is_symlink(fs::symlink_status(path, error))) return path;
-  const fs::path target = fs::weakly_canonical(path, error);
-  return error ? path : target.string();
+  if (fs::exists(status)) {
+    const fs::path target = fs::canonical(path, error);
+    return error ? path : target.string();
+  }
+  // A link to what is not there yet: the file it names is made.
+  const fs::path target = fs::read_symlink(path, error);
+  return error ? path : (fs::path(path).parent_path() / target).string();
 }
 
 }  // namespace
