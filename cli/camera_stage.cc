@@ -88,3 +88,4 @@ int RunCameraStage(CameraEstimationSettings settings, const OutputSettings& outp
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -34,3 +34,4 @@ class CameraStageDisplay {
 int RunCameraStage(CameraEstimationSettings settings, const OutputSettings& output, CameraEstimate* estimate);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -65,3 +65,4 @@ void AddCamerasCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -61,3 +61,4 @@ absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

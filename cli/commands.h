@@ -54,3 +54,4 @@ absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments);
 bool LacksCameras(const SceneArguments& arguments);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

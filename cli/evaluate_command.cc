@@ -86,3 +86,4 @@ void AddEvaluateCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

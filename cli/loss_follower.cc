@@ -61,3 +61,4 @@ absl::StatusOr<std::unique_ptr<LossFollower>> FollowLosses(const std::string& gr
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -33,3 +33,4 @@ absl::StatusOr<std::unique_ptr<LossFollower>> FollowLosses(const std::string& gr
                                                            const ReconstructionOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

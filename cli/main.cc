@@ -51,3 +51,4 @@ int main(int argc, char** argv) {
     return kExitFailed;
   }
 }
+// SPDX-License-Identifier: Apache-2.0

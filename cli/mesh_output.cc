@@ -53,3 +53,4 @@ absl::Status FetchMesh(ServiceClient& client, const std::string& id, const std::
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

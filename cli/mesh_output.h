@@ -13,3 +13,4 @@ namespace meshwright {
 absl::Status FetchMesh(ServiceClient& client, const std::string& id, const std::string& path, bool partial);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -90,3 +90,4 @@ void AddOptionsCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

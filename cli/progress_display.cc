@@ -110,3 +110,4 @@ std::string DescribeShares(double covered_before, double grown, double accepted)
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

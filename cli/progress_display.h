@@ -50,3 +50,4 @@ class ProgressDisplay {
 std::string DescribeShares(double covered_before, double grown, double accepted);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -96,3 +96,4 @@ TEST(DescribeSharesTest, TheyAddUp) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -26,3 +26,4 @@ void AddReconstructionFlags(CLI::App& command, ReconstructionOptions& options) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -11,3 +11,4 @@ namespace meshwright {
 void AddReconstructionFlags(CLI::App& command, ReconstructionOptions& options);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -30,3 +30,4 @@ nlohmann::ordered_json ToJson(const v1::Reconstruction& reconstruction);
 int WatchUntilOver(const ServiceArguments& arguments, ServiceClient& client, const std::string& id);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

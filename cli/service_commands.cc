@@ -223,3 +223,4 @@ void AddServiceCommands(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

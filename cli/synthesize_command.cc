@@ -92,3 +92,4 @@ void AddSynthesizeCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -128,3 +128,4 @@ void AddTextureCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

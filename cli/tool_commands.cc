@@ -9,3 +9,4 @@ void AddToolCommands(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

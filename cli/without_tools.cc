@@ -30,3 +30,4 @@ absl::StatusOr<std::unique_ptr<LossFollower>> FollowLosses(const std::string& /*
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

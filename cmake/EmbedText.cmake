@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Run with cmake -P: writes OUTPUT, a C++ file that defines
 #   const std::vector<std::pair<std::string, std::string>>& SYMBOL();   // (file name, content), sorted by name
 # in namespace meshwright, from the text files INPUTS (a ;-list).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # cmake --install: the programs, the dashboard where it was built, and the library with its headers and CMake package.
 # Components: cli, server, dashboard, dev. "server" also has files of the system (units, settings), which only the Debian
 # packages take: a plain --install stays below its prefix.

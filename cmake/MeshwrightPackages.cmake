@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Debian packages ("cpack -G DEB" in a build folder, or scripts/package): meshwright, meshwright-server, libmeshwright-dev,
 # and meshwright-dashboard where the dashboard was built. dpkg-shlibdeps says what the programs depend on.
 

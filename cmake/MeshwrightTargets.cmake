@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # One folder = one room = one target. A room's arrows (what it may include) are held by tests/arch.
 
 add_library(mw_compile_options INTERFACE)

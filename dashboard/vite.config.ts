@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { defineConfig } from 'vitest/config';
 
 // In development the API is another process: a coordinator, or tests/dashboard/fake_api.

@@ -60,3 +60,4 @@ std::string FormatCount(int64_t count) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

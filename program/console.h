@@ -37,3 +37,4 @@ std::string FormatBytes(double bytes);
 std::string FormatCount(int64_t count);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -73,3 +73,4 @@ absl::StatusOr<std::vector<Setting>> SettingsOfEnvironment(const std::vector<std
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -19,3 +19,4 @@ std::string EnvironmentNameOf(const std::string& setting);
 absl::StatusOr<std::vector<Setting>> SettingsOfEnvironment(const std::vector<std::string>& names);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

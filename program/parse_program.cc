@@ -150,3 +150,4 @@ std::optional<int> ParseProgram(CLI::App& program, int argc, char** argv, const 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -15,3 +15,4 @@ namespace meshwright {
 std::optional<int> ParseProgram(CLI::App& program, int argc, char** argv, const std::function<absl::Status()>& check);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

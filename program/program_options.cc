@@ -51,3 +51,4 @@ int WaitForStopSignal() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -30,3 +30,4 @@ void BlockStopSignals();
 int WaitForStopSignal();
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -63,3 +63,4 @@ absl::StatusOr<std::vector<Setting>> ParseSettingsFile(const std::string& path, 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

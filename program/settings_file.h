@@ -19,3 +19,4 @@ struct Setting {
 absl::StatusOr<std::vector<Setting>> ParseSettingsFile(const std::string& path, const std::string& text);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -183,3 +183,4 @@ TEST(UsageErrorTest, UnknownCommandsAndOptionsAreNamedWithTheNearest) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

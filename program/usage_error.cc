@@ -56,3 +56,4 @@ std::string DescribeUsageError(const CLI::App& program, const CLI::ParseError& e
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -11,3 +11,4 @@ namespace meshwright {
 std::string DescribeUsageError(const CLI::App& program, const CLI::ParseError& error);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Reads ctest's JUnit file; for each test that is a GoogleTest program the cases in results/NAME.xml count, otherwise the
 # test itself. A program that failed without a failed case (crash, time limit) counts as one failure more, and so does a
 # test that could not be run for any other reason than its own wish to be skipped.

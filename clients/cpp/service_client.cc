@@ -187,3 +187,4 @@ std::unique_ptr<ServiceClient> ServiceClient::Connect(const std::string& address
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

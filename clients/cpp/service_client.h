@@ -38,3 +38,4 @@ class ServiceClient {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -17,3 +17,4 @@ absl::Status BadInput(absl::Status status) {
 bool IsBadInput(const absl::Status& status) { return status.GetPayload(kBadInputUrl).has_value(); }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -9,3 +9,4 @@ absl::Status BadInput(absl::Status status);
 bool IsBadInput(const absl::Status& status);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

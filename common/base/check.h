@@ -12,3 +12,4 @@
       std::abort();                                                                          \
     }                                                                                        \
   } while (false)
+// SPDX-License-Identifier: Apache-2.0

@@ -28,3 +28,4 @@ class ManualClock : public Clock {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

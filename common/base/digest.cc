@@ -43,3 +43,4 @@ std::string Sha256Hex(const std::string& bytes) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

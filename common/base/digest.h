@@ -28,3 +28,4 @@ class Sha256Stream {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -22,3 +22,4 @@ TEST(Sha256, PiecesGiveTheDigestOfTheWhole) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -188,3 +188,4 @@ void RemoveStalePartialFiles(const std::string& folder, absl::Duration age) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -49,3 +49,4 @@ absl::Status WriteFileAtomically(const std::string& path, absl::Span<const uint8
 void RemoveStalePartialFiles(const std::string& folder, absl::Duration age);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

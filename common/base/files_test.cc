@@ -101,3 +101,4 @@ TEST_F(FilesTest, OnlyStalePartialFilesAreRemoved) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -60,3 +60,4 @@ FolderLock::~FolderLock() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -25,3 +25,4 @@ class FolderLock {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -52,3 +52,4 @@ TEST(FolderLock, AFolderThatIsNotThereIsAnError) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -28,3 +28,4 @@ absl::StatusOr<HostPort> ParseHostPort(const std::string& text, const std::strin
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -15,3 +15,4 @@ struct HostPort {
 absl::StatusOr<HostPort> ParseHostPort(const std::string& text, const std::string& name);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -26,3 +26,4 @@ TEST(HostPortTest, WhatIsNoneIsNamed) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

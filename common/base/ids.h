@@ -13,3 +13,4 @@ using CameraIndex = int32_t;
 using SequenceNumber = int32_t;
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -45,3 +45,4 @@ void AppendLittleEndian(T value, std::string& out) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -53,3 +53,4 @@ class ConditionVariable {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -45,3 +45,4 @@ std::string DidYouMean(const std::string& word, const std::vector<std::string>& 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

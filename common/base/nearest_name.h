@@ -13,3 +13,4 @@ std::string NearestName(const std::string& word, const std::vector<std::string>&
 std::string DidYouMean(const std::string& word, const std::vector<std::string>& names, const std::string& prefix = "");
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

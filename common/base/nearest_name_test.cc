@@ -29,3 +29,4 @@ TEST(NearestNameTest, TheSentence) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -23,3 +23,4 @@ double ThreadCpuSeconds() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

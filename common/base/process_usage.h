@@ -16,3 +16,4 @@ ProcessUsage MeasureProcessUsage();
 double ThreadCpuSeconds();
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -23,3 +23,4 @@ absl::Status ValidateRelativePath(const std::string& path) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

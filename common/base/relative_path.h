@@ -10,3 +10,4 @@ namespace meshwright {
 absl::Status ValidateRelativePath(const std::string& path);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -25,3 +25,4 @@
   declaration = std::move(name).value()
 
 // NOLINTEND(bugprone-macro-parentheses)
+// SPDX-License-Identifier: Apache-2.0

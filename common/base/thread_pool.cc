@@ -85,3 +85,4 @@ void ThreadPool::ParallelFor(int64_t count, int64_t grain, const std::function<v
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

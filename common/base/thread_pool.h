@@ -41,3 +41,4 @@ class ThreadPool {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

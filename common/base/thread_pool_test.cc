@@ -40,3 +40,4 @@ TEST(ThreadPool, SeveralCallersAndNestedLoops) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -31,3 +31,4 @@ absl::Status ValidateDigest(const std::string& digest) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

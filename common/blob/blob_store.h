@@ -32,3 +32,4 @@ class BlobStore {
 absl::Status ValidateDigest(const std::string& digest);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -189,3 +189,4 @@ TEST_P(BlobStoreConformanceTest, ThreadsAndProcessesDoNotDisturbEachOther) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -144,3 +144,4 @@ absl::Status FilesystemBlobStore::Delete(const std::string& digest) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -35,3 +35,4 @@ class FilesystemBlobStore : public BlobStore {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -104,3 +104,4 @@ TEST_F(FilesystemBlobStoreTest, FullDiskIsResourceExhaustedAndLeavesNothing) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -34,3 +34,4 @@ std::string LostBlobOf(const absl::Status& status) {
 bool IsBlobLost(const absl::Status& status) { return absl::IsDataLoss(status) || absl::IsNotFound(status); }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -44,3 +44,4 @@ absl::StatusOr<std::unique_ptr<BlobStore>> OpenBlobStore(const std::string& wher
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -19,3 +19,4 @@ absl::StatusOr<std::unique_ptr<BlobStore>> OpenBlobStore(const std::string& wher
 absl::StatusOr<S3Options> ParseS3Url(const std::string& url);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -138,3 +138,4 @@ absl::Status S3BlobStore::Delete(const std::string& digest) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

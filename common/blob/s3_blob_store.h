@@ -34,3 +34,4 @@ class S3BlobStore : public BlobStore {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

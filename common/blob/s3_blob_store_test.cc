@@ -203,3 +203,4 @@ TEST(S3CredentialsTest, ComeFromTheEnvironment) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -223,3 +223,4 @@ absl::Status S3Client::ErrorOf(const S3Request& request, const S3Response& respo
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -86,3 +86,4 @@ class S3Client {
 std::string XmlText(const std::string& xml, const std::string& tag);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

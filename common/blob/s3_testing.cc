@@ -74,3 +74,4 @@ std::string S3Server::FileOf(const S3Options& options, const std::string& key) c
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

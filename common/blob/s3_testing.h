@@ -33,3 +33,4 @@ class S3Server {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

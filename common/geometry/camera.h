@@ -53,3 +53,4 @@ struct Camera {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

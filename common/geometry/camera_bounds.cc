@@ -43,3 +43,4 @@ absl::Status CheckCamera(const Camera& camera) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

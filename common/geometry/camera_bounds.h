@@ -19,3 +19,4 @@ constexpr int kLargestImageSide = 1 << 17;   // px
 absl::Status CheckCamera(const Camera& camera);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -61,3 +61,4 @@ TEST(CheckCamera, EveryNumberIsBoundedAndNamed) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -62,3 +62,4 @@ TEST(LevelOfDetail, ProjectsToTheLatticeStep) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

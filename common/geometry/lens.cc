@@ -131,3 +131,4 @@ Vector2d Lens::PlaneFromPixel(const Vector2d& pixel) const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

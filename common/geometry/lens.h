@@ -42,3 +42,4 @@ struct Lens {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -99,3 +99,4 @@ TEST(Lens, InverseStaysFiniteWhereTheModelHasNone) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -11,3 +11,4 @@ inline double LevelOfDetail(const Camera& camera, double depth, double lattice_s
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -22,3 +22,4 @@ inline Rigid3 Inverse(const Rigid3& b_from_a) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

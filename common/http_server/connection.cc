@@ -541,3 +541,4 @@ void Connection::Close() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -139,3 +139,4 @@ class Connection : public std::enable_shared_from_this<Connection> {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

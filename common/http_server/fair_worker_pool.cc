@@ -70,3 +70,4 @@ void FairWorkerPool::Shutdown() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

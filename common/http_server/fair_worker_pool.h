@@ -48,3 +48,4 @@ class FairWorkerPool {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

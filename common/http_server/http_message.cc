@@ -104,3 +104,4 @@ void HttpResponse::SetEvents(const std::string& content_type, std::unique_ptr<Ht
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

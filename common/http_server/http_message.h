@@ -122,3 +122,4 @@ class HttpHandler {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

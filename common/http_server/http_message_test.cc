@@ -41,3 +41,4 @@ TEST(HttpMessageTest, FindsHeadersWhateverTheirCase) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

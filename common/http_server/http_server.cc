@@ -203,3 +203,4 @@ absl::StatusOr<std::unique_ptr<HttpServer>> HttpServer::Start(const HttpServerOp
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -55,3 +55,4 @@ class HttpServer {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

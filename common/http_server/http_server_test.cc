@@ -580,3 +580,4 @@ TEST_F(HttpServerTest, SpeaksTlsAndTakesUpANewCertificate) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -141,3 +141,4 @@ absl::Status WriteTestCertificate(const std::string& name, const std::string& ce
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

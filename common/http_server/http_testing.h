@@ -43,3 +43,4 @@ absl::Status WriteTestCertificate(const std::string& name, const std::string& ce
                                   const std::string& key_file);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -148,3 +148,4 @@ bool RequestParser::DecodeChunked(const std::string& encoded, absl::Span<char> d
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

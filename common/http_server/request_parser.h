@@ -61,3 +61,4 @@ class RequestParser final : private boost::beast::http::basic_parser<true> {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -73,3 +73,4 @@ std::shared_ptr<TlsFiles::Context> TlsFiles::Current() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -42,3 +42,4 @@ class TlsFiles {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -25,3 +25,4 @@ absl::StatusOr<ImageSize> PnmSize(const std::string& bytes);
 absl::StatusOr<ColorImage> DecodePnm(const std::string& bytes);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

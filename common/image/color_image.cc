@@ -15,3 +15,4 @@ GreyImage ToGrey(const ColorImage& image) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

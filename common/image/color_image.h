@@ -34,3 +34,4 @@ struct GreyImage {
 GreyImage ToGrey(const ColorImage& image);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -93,3 +93,4 @@ TEST(Remap, ReproducesQuadraticsAndFlatImages) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

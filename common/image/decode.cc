@@ -105,3 +105,4 @@ absl::StatusOr<ColorImage> DecodeImage(const std::string& path) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

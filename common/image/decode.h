@@ -31,3 +31,4 @@ absl::StatusOr<ColorImage> DecodeImage(const std::string& path);
 absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std::string& name);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -305,3 +305,4 @@ TEST(WritePng, UnwritablePlaceIsNamed) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -13,3 +13,4 @@ absl::Status WriteJpeg(const std::string& path, const ColorImage& image, int qua
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -19,3 +19,4 @@ absl::Status WritePng(const std::string& path, const ColorImage& image);
 absl::Status WriteJpeg(const std::string& path, const ColorImage& image, int quality);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -60,3 +60,4 @@ BENCHMARK(BM_MakeSamplingImage)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

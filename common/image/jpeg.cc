@@ -152,3 +152,4 @@ std::string EncodeJpeg(const ColorImage& image, int quality) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -150,3 +150,4 @@ std::string EncodePng(const ColorImage& image) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

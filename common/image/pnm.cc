@@ -93,3 +93,4 @@ absl::StatusOr<ColorImage> DecodePnm(const std::string& bytes) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -87,3 +87,4 @@ ColorImage Remap(const ColorImage& image, int width, int height, const SourceOfR
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -22,3 +22,4 @@ using SourceOfRow = std::function<void(int row, std::vector<SourcePosition>* sou
 ColorImage Remap(const ColorImage& image, int width, int height, const SourceOfRow& source_of_row);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -61,3 +61,4 @@ ColorImage ReduceByArea(const ColorImage& image, int width, int height) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -10,3 +10,4 @@ namespace meshwright {
 ColorImage ReduceByArea(const ColorImage& image, int width, int height);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

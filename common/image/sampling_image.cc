@@ -61,3 +61,4 @@ int64_t SamplingImage::bytes() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -37,3 +37,4 @@ class SamplingImage {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

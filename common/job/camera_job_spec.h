@@ -30,3 +30,4 @@ struct CameraJobSpec {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -46,3 +46,4 @@ absl::StatusOr<StoredJobSpec> DecodeJobSpec(const std::string& text) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

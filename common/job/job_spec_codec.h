@@ -24,3 +24,4 @@ std::string EncodeJobSpec(const StoredJobSpec& spec);
 absl::StatusOr<StoredJobSpec> DecodeJobSpec(const std::string& json);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

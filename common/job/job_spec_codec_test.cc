@@ -30,3 +30,4 @@ TEST(JobSpecCodecTest, DamageIsDataLoss) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -43,3 +43,4 @@ absl::Status CheckJsonLimits(const std::string& text, const JsonLimits& limits) 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -19,3 +19,4 @@ struct JsonLimits {
 absl::Status CheckJsonLimits(const std::string& text, const JsonLimits& limits);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

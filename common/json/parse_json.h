@@ -24,3 +24,4 @@ absl::StatusOr<Json> ParseJson(const std::string& text, const JsonLimits& limits
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

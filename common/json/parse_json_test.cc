@@ -51,3 +51,4 @@ TEST(ParseJsonTest, WhatIsNoJsonIsRefused) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -412,3 +412,4 @@ int64_t BorderStitcher::FillHoles(double max_width) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -120,3 +120,4 @@ class BorderStitcher {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -35,3 +35,4 @@ class DisjointSets {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

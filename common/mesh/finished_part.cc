@@ -89,3 +89,4 @@ FinishedPart FinishPart(const SparseSurface& surface, const PartBorders::Part& p
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -357,3 +357,4 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -54,3 +54,4 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(
     const std::function<void()>& part_done = [] {});
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -444,3 +444,4 @@ TEST(JoinOptionsTest, RefusesValuesOutOfRange) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -55,3 +55,4 @@ BENCHMARK(BM_ReadPly)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

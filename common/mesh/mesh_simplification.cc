@@ -140,3 +140,4 @@ std::vector<Face> SimplifyFaces(const std::vector<Eigen::Vector3f>& positions, c
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -22,3 +22,4 @@ std::vector<std::array<uint32_t, 3>> SimplifyFaces(const std::vector<Eigen::Vect
                                                    const std::vector<std::pair<uint32_t, uint32_t>>& other_edges);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

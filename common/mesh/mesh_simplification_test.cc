@@ -150,3 +150,4 @@ TEST(SimplifyFacesTest, NothingStaysNothing) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -164,3 +164,4 @@ absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& lo
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -131,3 +131,4 @@ PartMesh BuildPartMesh(const SparseSurface& surface, const std::vector<uint8_t>&
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -24,3 +24,4 @@ struct PartMesh {
 PartMesh BuildPartMesh(const SparseSurface& surface, const std::vector<uint8_t>& removed);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

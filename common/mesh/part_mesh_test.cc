@@ -71,3 +71,4 @@ TEST(PartMeshTest, ComponentsAreWhatEdgesConnect) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -67,3 +67,4 @@ class PlyStreamWriter {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -189,3 +189,4 @@ std::string FormatHeader(const PlyAttributes& attributes, int64_t vertices, int6
 }
 
 }  // namespace meshwright::ply
+// SPDX-License-Identifier: Apache-2.0

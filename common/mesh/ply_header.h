@@ -49,3 +49,4 @@ absl::StatusOr<Header> ParseHeader(const std::string& bytes, const std::string& 
 std::string FormatHeader(const PlyAttributes& attributes, int64_t vertices, int64_t faces);
 
 }  // namespace meshwright::ply
+// SPDX-License-Identifier: Apache-2.0

@@ -290,3 +290,4 @@ absl::StatusOr<TriangleMesh> ReadPly(const std::string& path) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -323,3 +323,4 @@ TEST(ReadPly, HeadersAreReadInLinearTime) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -116,3 +116,4 @@ class AsciiValues {
 };
 
 }  // namespace meshwright::ply
+// SPDX-License-Identifier: Apache-2.0

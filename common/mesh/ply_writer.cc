@@ -195,3 +195,4 @@ absl::Status PlyStreamWriter::Commit() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -77,3 +77,4 @@ void BlendSeams(const std::vector<SeamOffset>& offsets, int steps, const SparseS
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -40,3 +40,4 @@ absl::Status WriteSurfacePart(const SparseSurface& surface, const std::string& p
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -21,3 +21,4 @@ inline absl::Status WriteSurfacePart(const PatchLattice& surface, const std::str
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -68,3 +68,4 @@ TEST_F(SurfaceMeshTest, PartIsWrittenWhole) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -123,3 +123,4 @@ void MarkCovered(const SparseSurface& surface, const SparseSurface& cover, const
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -46,3 +46,4 @@ void MarkCovered(const SparseSurface& surface, const SparseSurface& cover, const
                  double margin_steps, ThreadPool& pool, std::vector<uint8_t>& removed);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -91,3 +91,4 @@ TEST(SurfaceOverlapTest, PatchesTooFarFromThePlaneOrTurnedAwayStay) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -21,3 +21,4 @@ struct TriangleMesh {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

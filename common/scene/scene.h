@@ -39,3 +39,4 @@ struct Scene {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -84,3 +84,4 @@ absl::StatusOr<std::string> CheckAndDigestScene(const Scene& scene, ThreadPool& 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

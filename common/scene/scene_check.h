@@ -17,3 +17,4 @@ absl::StatusOr<std::string> CheckAndDigestScene(const Scene& scene, ThreadPool& 
                                                 const std::function<void(int n)>& checked);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -152,3 +152,4 @@ absl::StatusOr<Scene> DecodeScene(const std::string& bytes) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

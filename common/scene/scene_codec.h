@@ -16,3 +16,4 @@ std::string EncodeScene(const Scene& scene);
 absl::StatusOr<Scene> DecodeScene(const std::string& bytes);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

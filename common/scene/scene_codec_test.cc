@@ -53,3 +53,4 @@ TEST(SceneCodecTest, TruncatedOrFlippedBytesAreRefused) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -124,3 +124,4 @@ Camera LargestPinhole(const Lens& lens) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

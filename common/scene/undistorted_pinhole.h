@@ -13,3 +13,4 @@ namespace meshwright {
 Camera LargestPinhole(const Lens& lens);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

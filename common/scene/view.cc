@@ -77,3 +77,4 @@ absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& pictur
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -30,3 +30,4 @@ absl::StatusOr<View> LoadView(const SceneView& view, int max_image_size);
 absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& picture_bytes, int max_image_size);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

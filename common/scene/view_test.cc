@@ -202,3 +202,4 @@ TEST(LoadView, NamesFileAndSizes) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

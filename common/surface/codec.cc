@@ -305,3 +305,4 @@ absl::StatusOr<SparseSurface> DecodeSparseSurface(const std::string& bytes) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -21,3 +21,4 @@ absl::StatusOr<SparseSurface> DecodeSparseSurface(const std::string& bytes);
 absl::StatusOr<PatchLattice> DecodeSurface(const std::string& bytes);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -181,3 +181,4 @@ TEST(SurfaceCodec, NumbersThatNoCameraHasAreDataLoss) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -37,3 +37,4 @@ struct Lattice {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -59,3 +59,4 @@ struct PatchLattice {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

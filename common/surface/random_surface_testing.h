@@ -49,3 +49,4 @@ inline PatchLattice RandomSurface(uint32_t seed, const Camera& camera, int step,
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -58,3 +58,4 @@ PatchFinder::PatchFinder(const SparseSurface& surface) : words_(static_cast<size
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

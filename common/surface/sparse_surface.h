@@ -72,3 +72,4 @@ class PatchFinder {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -55,3 +55,4 @@ TEST(PatchFinder, FindsWhatASearchFinds) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

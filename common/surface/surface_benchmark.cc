@@ -33,3 +33,4 @@ BENCHMARK(BM_TriangulateLattice)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -30,3 +30,4 @@ absl::StatusOr<std::shared_ptr<const SparseSurface>> SurfaceCache::Get(const std
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -41,3 +41,4 @@ class SurfaceCache {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

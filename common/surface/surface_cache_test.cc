@@ -71,3 +71,4 @@ TEST(SurfaceCache, ManyThreadsMayAsk) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -86,3 +86,4 @@ std::vector<std::array<int32_t, 3>> TriangulateLattice(const PatchLattice& surfa
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

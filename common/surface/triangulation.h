@@ -17,3 +17,4 @@ std::vector<std::array<int32_t, 3>> Triangulate(const SparseSurface& surface);
 std::vector<std::array<int32_t, 3>> TriangulateLattice(const PatchLattice& surface);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -144,3 +144,4 @@ TEST(TriangulateLattice, CutAlongAColumnGivesTwoPieces) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

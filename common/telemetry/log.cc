@@ -100,3 +100,4 @@ void Logger::Log(LogLevel level, const std::string& message, const LogFields& fi
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -51,3 +51,4 @@ class Logger {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

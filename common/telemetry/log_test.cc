@@ -74,3 +74,4 @@ TEST_F(LogTest, ThreadsDoNotMixLines) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -41,3 +41,4 @@ absl::Status MeasuredBlobStore::Delete(const std::string& digest) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -29,3 +29,4 @@ class MeasuredBlobStore final : public BlobStore {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

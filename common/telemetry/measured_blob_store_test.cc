@@ -43,3 +43,4 @@ TEST(MeasuredBlobStoreTest, PassesThroughAndCounts) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

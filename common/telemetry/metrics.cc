@@ -86,3 +86,4 @@ void CallMetrics::Record(const std::string& operation, absl::Duration took, cons
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -61,3 +61,4 @@ class CallMetrics {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -75,3 +75,4 @@ absl::StatusOr<std::unique_ptr<MetricsServer>> MetricsServer::Start(const std::s
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

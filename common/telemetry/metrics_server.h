@@ -24,3 +24,4 @@ class MetricsServer {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -73,3 +73,4 @@ TEST(MetricsServerTest, ManyScrapersAreAnswered) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

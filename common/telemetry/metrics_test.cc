@@ -61,3 +61,4 @@ TEST(MetricsTest, CallsAreTimedAndOnlyFailuresCountAsErrors) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -99,3 +99,4 @@ std::vector<MetricFamily> ProcessMetrics::Collect() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

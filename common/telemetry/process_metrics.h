@@ -16,3 +16,4 @@ class ProcessMetrics : public prometheus::Collectable {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -239,3 +239,4 @@ int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -50,3 +50,4 @@ absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int
 int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

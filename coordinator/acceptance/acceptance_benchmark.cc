@@ -37,3 +37,4 @@ BENCHMARK(BM_AcceptSurface)->ArgsProduct({{0, 1}, {1, 2}})->Unit(benchmark::kMil
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -263,3 +263,4 @@ TEST(RemoveSmallComponents, RemovesWhatHangsTogetherTooLittle) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

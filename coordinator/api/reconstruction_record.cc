@@ -98,3 +98,4 @@ absl::Status ValidateReconstructionId(const std::string& id) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -21,3 +21,4 @@ v1::Attempt ToProto(const std::string& reconstruction, const Attempt& attempt);
 absl::Status ValidateReconstructionId(const std::string& id);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -485,3 +485,4 @@ void ReconstructionService::Shutdown() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

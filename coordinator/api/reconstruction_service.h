@@ -100,3 +100,4 @@ class ReconstructionService {
 bool IsOver(v1::ReconstructionState state);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

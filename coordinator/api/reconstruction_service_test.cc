@@ -307,3 +307,4 @@ TEST_F(ReconstructionServiceTest, AnUploadIsThereWholeOrNotAtAll) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

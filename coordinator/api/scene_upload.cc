@@ -69,3 +69,4 @@ absl::Status SceneFileUpload::Finish() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -39,3 +39,4 @@ class SceneFileUpload {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

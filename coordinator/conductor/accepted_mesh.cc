@@ -31,3 +31,4 @@ absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(const std::vector<AcceptedSur
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -23,3 +23,4 @@ absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(
     ThreadPool& pool, const std::function<void()>& part_done = [] {});
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

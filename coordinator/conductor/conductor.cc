@@ -414,3 +414,4 @@ std::vector<AcceptedSurface> Conductor::AcceptedSurfaces() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

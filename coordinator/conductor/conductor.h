@@ -157,3 +157,4 @@ class Conductor {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -278,3 +278,4 @@ TEST_F(ConductorTest, OptionsAreChecked) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

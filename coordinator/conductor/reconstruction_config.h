@@ -29,3 +29,4 @@ struct ReconstructionConfig {
 using ParseReconstructionConfig = std::function<absl::StatusOr<ReconstructionConfig>(const std::string& options_json)>;
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

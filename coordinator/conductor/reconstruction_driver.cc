@@ -315,3 +315,4 @@ absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionC
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -104,3 +104,4 @@ class ReconstructionDriver {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -36,3 +36,4 @@ absl::Status ReferencedBlobs::PutFile(const std::string& path, const std::string
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

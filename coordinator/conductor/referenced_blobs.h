@@ -31,3 +31,4 @@ class ReferencedBlobs {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

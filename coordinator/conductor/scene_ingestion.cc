@@ -92,3 +92,4 @@ absl::Status MaterializeScene(const std::vector<SceneFile>& files, BlobStore& bl
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

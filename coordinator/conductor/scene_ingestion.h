@@ -30,3 +30,4 @@ absl::StatusOr<IngestedScene> IngestScene(const std::string& folder, ReferencedB
 absl::Status MaterializeScene(const std::vector<SceneFile>& files, BlobStore& blobs, const std::string& folder);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

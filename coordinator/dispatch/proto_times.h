@@ -12,3 +12,4 @@ inline void FillTime(absl::Time time, google::protobuf::Timestamp& timestamp) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -254,3 +254,4 @@ int SchedulingPass::LeasesIn(const std::string& reconstruction) const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

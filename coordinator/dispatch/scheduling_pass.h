@@ -103,3 +103,4 @@ class SchedulingPass {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

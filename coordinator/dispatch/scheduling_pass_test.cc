@@ -280,3 +280,4 @@ TEST(SchedulingPassTest, WhatIsGivenBackCountsForNothing) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

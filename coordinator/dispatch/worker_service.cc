@@ -484,3 +484,4 @@ v1::ListWorkersResponse WorkerService::ListWorkers() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -117,3 +117,4 @@ class WorkerService {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

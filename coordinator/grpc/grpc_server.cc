@@ -292,3 +292,4 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const std::string&
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

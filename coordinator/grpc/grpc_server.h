@@ -31,3 +31,4 @@ class GrpcServer {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

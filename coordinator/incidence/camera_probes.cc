@@ -138,3 +138,4 @@ std::vector<CameraProbes> ProbesFromDepths(const std::vector<CameraGeometry>& ca
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -45,3 +45,4 @@ std::vector<CameraProbes> ProbesFromDepths(const std::vector<CameraGeometry>& ca
                                            const std::vector<double>& typical_depths);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

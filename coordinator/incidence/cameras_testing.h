@@ -21,3 +21,4 @@ inline Camera CameraLookingAt(const Eigen::Vector3d& center_in_world, const Eige
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

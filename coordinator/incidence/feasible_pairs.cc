@@ -170,3 +170,4 @@ absl::StatusOr<FeasiblePairs> FindFeasiblePairs(const std::vector<Camera>& camer
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -78,3 +78,4 @@ absl::StatusOr<FeasiblePairs> FindFeasiblePairs(const std::vector<Camera>& camer
                                                 const FeasiblePairOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -205,3 +205,4 @@ TEST(FeasiblePairs, OptionsNameWhatIsWrong) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -128,3 +128,4 @@ absl::StatusOr<IncidenceMatrix> IncidenceMatrix::Deserialize(const std::string& 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -94,3 +94,4 @@ TEST(IncidenceMatrix, DamagedBytesAreRefusedOrWellFormed) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

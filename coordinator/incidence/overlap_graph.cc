@@ -65,3 +65,4 @@ OverlapGraph FindOverlaps(const std::vector<CameraGeometry>& cameras, const std:
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -45,3 +45,4 @@ OverlapGraph FindOverlaps(const std::vector<CameraGeometry>& cameras, const std:
                           const IncidenceMatrix& feasible, const OverlapOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -73,3 +73,4 @@ TEST(OverlapGraph, LongStreetsStayQuick) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -79,3 +79,4 @@ PairOutcome TestTransversal(const CameraGeometry& a, const CameraGeometry& b, co
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -61,3 +61,4 @@ PairOutcome TestTransversal(const CameraGeometry& a, const CameraGeometry& b, co
                             Eigen::Vector3d& midpoint_in_world);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

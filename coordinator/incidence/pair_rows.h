@@ -37,3 +37,4 @@ std::vector<PairRow> PairsFromAxes(const std::vector<CameraGeometry>& cameras, c
                                    const PairLimits& limits, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -99,3 +99,4 @@ std::vector<PairRow> PairsFromAxes(const std::vector<CameraGeometry>& cameras, c
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

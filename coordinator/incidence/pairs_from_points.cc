@@ -97,3 +97,4 @@ std::vector<PairRow> PairsFromPoints(const std::vector<CameraGeometry>& cameras,
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -143,3 +143,4 @@ TEST_F(RealScene, TempleRings) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

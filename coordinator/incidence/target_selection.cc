@@ -101,3 +101,4 @@ std::vector<CameraIndex> ChooseTargets(CameraIndex reference, const std::vector<
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

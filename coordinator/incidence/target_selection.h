@@ -30,3 +30,4 @@ std::vector<CameraIndex> ChooseTargets(CameraIndex reference, const std::vector<
                                        const std::vector<CameraProbes>& probes, const TargetSelectionOptions& options);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -67,3 +67,4 @@ TEST(TargetSelection, FirstOnesAreTheSameForAnyLimit) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -73,3 +73,4 @@ absl::Status CheckSettings(const CoordinatorSettings& settings) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

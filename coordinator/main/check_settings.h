@@ -17,3 +17,4 @@ absl::Status CheckSettings(const CoordinatorSettings& settings);
 absl::StatusOr<std::string> ReadApiToken(const std::string& path);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -43,3 +43,4 @@ int main(int argc, char** argv) {
   if (settings.blobs.empty()) KeepFilesPrivate();
   return Serve(settings);
 }
+// SPDX-License-Identifier: Apache-2.0

@@ -60,3 +60,4 @@ void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -12,3 +12,4 @@ void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings);
 void AddRestOptions(CLI::App& program, CoordinatorSettings& settings);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

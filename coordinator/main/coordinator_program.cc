@@ -158,3 +158,4 @@ absl::StatusOr<std::unique_ptr<CoordinatorProgram>> CoordinatorProgram::Start(co
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -43,3 +43,4 @@ class CoordinatorProgram {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -34,3 +34,4 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where,
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

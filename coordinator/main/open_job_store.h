@@ -17,3 +17,4 @@ absl::Status CheckJobStore(const std::string& where);
 absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where, const WrapSqlDatabase& wrap = nullptr);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -52,3 +52,4 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -21,3 +21,4 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
                                                      BlobStore& blobs, JobStore& store, const Logger& log);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

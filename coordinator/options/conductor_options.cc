@@ -18,3 +18,4 @@ absl::Status ConductorOptions::Validate() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -26,3 +26,4 @@ struct ConductorOptions {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

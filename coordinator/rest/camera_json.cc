@@ -177,3 +177,4 @@ absl::StatusOr<Json> LogJson(const ReconstructionService& service, const std::st
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

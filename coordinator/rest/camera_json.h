@@ -16,3 +16,4 @@ absl::StatusOr<nlohmann::ordered_json> CamerasJson(const ReconstructionService& 
 absl::StatusOr<nlohmann::ordered_json> LogJson(const ReconstructionService& service, const std::string& id);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

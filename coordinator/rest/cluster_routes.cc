@@ -55,3 +55,4 @@ std::vector<Route> MakeRoutes(const RestContext& context) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

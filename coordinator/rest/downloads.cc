@@ -173,3 +173,4 @@ absl::StatusOr<std::shared_ptr<const OpenedFile>> DerivedFiles::Get(
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -83,3 +83,4 @@ TEST(DerivedFilesTest, MakesEachOnceAndKeepsTheLastOnes) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -208,3 +208,4 @@ std::optional<std::string> EventFeeds::Stream::Next() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -86,3 +86,4 @@ class EventFeeds {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -58,3 +58,4 @@ std::string Dump(const nlohmann::ordered_json& json) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

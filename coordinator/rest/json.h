@@ -17,3 +17,4 @@ absl::Status FromJson(const std::string& json, google::protobuf::Message& messag
 std::string Dump(const nlohmann::ordered_json& json);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -136,3 +136,4 @@ TEST(OpenApiTest, EachRouteIsReached) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -171,3 +171,4 @@ std::string MakePartPreview(const SparseSurface& surface, int32_t sequence, int6
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -15,3 +15,4 @@ namespace meshwright {
 std::string MakePartPreview(const SparseSurface& surface, int32_t sequence, int64_t max_faces);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -143,3 +143,4 @@ TEST(PartPreviewTest, OfNothingIsAHeader) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -158,3 +158,4 @@ absl::Status StatusOfFault(const HttpFault& fault) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

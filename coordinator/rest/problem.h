@@ -26,3 +26,4 @@ std::string ProblemJson(const absl::Status& status);
 absl::Status StatusOfFault(const HttpFault& fault);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -148,3 +148,4 @@ void AddReconstructionRoutes(const RestContext& context, std::vector<Route>& rou
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -149,3 +149,4 @@ absl::StatusOr<std::unique_ptr<RestServer>> RestServer::Start(const RestOptions&
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -50,3 +50,4 @@ class RestServer {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -153,3 +153,4 @@ void AddResultRoutes(const RestContext& context, std::vector<Route>& routes) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

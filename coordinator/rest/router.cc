@@ -167,3 +167,4 @@ void AnswerStatus(const absl::Status& status, HttpResponse& response) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -65,3 +65,4 @@ absl::Status TakeBody(RestCall& call, int64_t most, std::function<absl::Status(a
 void AnswerStatus(const absl::Status& status, HttpResponse& response);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -93,3 +93,4 @@ TEST(ProblemTest, IsTextWhateverCameFromOutside) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -40,3 +40,4 @@ std::vector<Route> MakeRoutes(const RestContext& context);
 constexpr char kJsonType[] = "application/json";
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -113,3 +113,4 @@ void AddSceneRoutes(const RestContext& context, std::vector<Route>& routes) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -354,3 +354,4 @@ void SceneUploads::Sweep() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -107,3 +107,4 @@ class SceneUploads {
 std::optional<int64_t> ExpectedOffsetOf(const absl::Status& status);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -107,3 +107,4 @@ absl::Status SendPage(RestCall& call, const std::string& folder) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -12,3 +12,4 @@ namespace meshwright {
 absl::Status SendPage(RestCall& call, const std::string& folder);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -118,3 +118,4 @@ void Schedule::Choose() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -110,3 +110,4 @@ class Schedule {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -264,3 +264,4 @@ TEST(Schedule, TenThousandCamerasAreQuick) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -60,3 +60,4 @@ bool IsFinal(ReconstructionState state) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

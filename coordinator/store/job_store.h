@@ -350,3 +350,4 @@ std::string PrintableText(const std::string& text);
 bool IsFinal(ReconstructionState state);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

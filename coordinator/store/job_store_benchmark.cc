@@ -116,3 +116,4 @@ BENCHMARK(WholeLife)->ArgName("postgres")->Arg(0)->Arg(1)->UseRealTime();
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

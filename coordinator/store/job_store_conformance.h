@@ -786,3 +786,4 @@ TEST_P(JobStoreConformance, AMeshEndsAReconstruction) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -254,3 +254,4 @@ PostgresError PostgresConnection::Migrate(absl::Time deadline) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

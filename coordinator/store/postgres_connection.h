@@ -75,3 +75,4 @@ class PostgresConnection {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -195,3 +195,4 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenPostgresJobStore(const std::string
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

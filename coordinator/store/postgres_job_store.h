@@ -26,3 +26,4 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenPostgresJobStore(const std::string
                                                                const WrapSqlDatabase& wrap = nullptr);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -193,3 +193,4 @@ TEST(PostgresRestartTest, CallsOutliveARestart) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

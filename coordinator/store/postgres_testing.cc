@@ -94,3 +94,4 @@ std::string RunSql(const std::string& url, const std::string& sql) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

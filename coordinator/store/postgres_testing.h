@@ -49,3 +49,4 @@ class PostgresSchema {
 std::string RunSql(const std::string& url, const std::string& sql);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -33,3 +33,4 @@ std::map<std::string, std::string> ParseSqlStatements(const std::vector<std::pai
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

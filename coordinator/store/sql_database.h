@@ -68,3 +68,4 @@ std::map<std::string, std::string> ParseSqlStatements(const std::vector<std::pai
 const std::vector<std::pair<std::string, std::string>>& CommonStatements();
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

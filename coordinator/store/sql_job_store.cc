@@ -405,3 +405,4 @@ absl::StatusOr<CameraJob> SqlJobStore::GetFencedCameraJob(const std::string& id,
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

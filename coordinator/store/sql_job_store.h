@@ -89,3 +89,4 @@ SqlCall SkipCall(const std::string& id, SequenceNumber sequence, int64_t epoch, 
                  bool out_of_memory, absl::Time now);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

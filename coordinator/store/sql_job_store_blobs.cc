@@ -60,3 +60,4 @@ absl::Status SqlJobStore::ForgetDamagedBlob(const std::string& id, const std::st
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

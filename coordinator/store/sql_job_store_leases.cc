@@ -237,3 +237,4 @@ absl::Status SqlJobStore::RemoveSilentWorkers(absl::Time before) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

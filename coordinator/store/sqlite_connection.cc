@@ -191,3 +191,4 @@ absl::Status SqliteConnection::Migrate() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

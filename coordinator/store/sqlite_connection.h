@@ -74,3 +74,4 @@ class SqliteConnection {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

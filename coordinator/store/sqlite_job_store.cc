@@ -94,3 +94,4 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenSqliteJobStore(const std::string& 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

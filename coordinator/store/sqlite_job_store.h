@@ -17,3 +17,4 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenSqliteJobStore(const std::string& 
                                                              const WrapSqlDatabase& wrap = nullptr);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -81,3 +81,4 @@ TEST(SqliteJobStoreTest, AStoreOfTheFirstVersionIsBroughtUpToDateWithWhatIsInIt)
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

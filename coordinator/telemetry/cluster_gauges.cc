@@ -96,3 +96,4 @@ void AddClusterGauges(Metrics& metrics, SqlDatabase& database, const WorkerServi
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -16,3 +16,4 @@ void AddClusterGauges(Metrics& metrics, SqlDatabase& database, const WorkerServi
                       const std::string& data_folder);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -145,3 +145,4 @@ void MeasuredSqlDatabase::CountChanges(const std::string& statement, const SqlPa
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -37,3 +37,4 @@ class MeasuredSqlDatabase final : public SqlDatabase {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

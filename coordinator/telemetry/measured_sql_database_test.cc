@@ -234,3 +234,4 @@ TEST(MeasuredSqlDatabaseTest, ErrorsAreCountedAndChangeNothingElse) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -51,3 +51,4 @@ std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeRpcMe
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -14,3 +14,4 @@ namespace meshwright {
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeRpcMetrics(Metrics& metrics);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -58,3 +58,4 @@ TEST(RpcMetricsTest, CallsAreTimedByMethodAndErrorsByCode) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

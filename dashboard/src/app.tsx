@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { lazy, Suspense } from 'preact/compat';
 import { useState } from 'preact/hooks';
 import { rememberToken, tokenWanted } from './api/client';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Addresses are in the fragment, so that the page needs nothing of whoever serves it.
 import { signal } from '@preact/signals';
 

@@ -52,3 +52,4 @@ std::vector<CameraGroup> GroupByCamera(const std::vector<Photograph>& photograph
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -22,3 +22,4 @@ struct CameraGroup {
 std::vector<CameraGroup> GroupByCamera(const std::vector<Photograph>& photographs);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -43,3 +43,4 @@ TEST(CameraGroups, FewPhotographsDoNotDetermineManyCoefficients) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

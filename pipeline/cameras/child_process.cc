@@ -148,3 +148,4 @@ absl::StatusOr<ChildExit> RunChild(const std::vector<std::string>& arguments,
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -26,3 +26,4 @@ absl::StatusOr<ChildExit> RunChild(const std::vector<std::string>& arguments,
                                    const std::function<bool()>& stop);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

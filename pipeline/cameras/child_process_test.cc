@@ -100,3 +100,4 @@ TEST(ChildProcess, DiesWithItsParentWhateverKillsIt) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -173,3 +173,4 @@ absl::StatusOr<std::string> ColmapDatabase::StartVerification() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -52,3 +52,4 @@ class ColmapDatabase {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

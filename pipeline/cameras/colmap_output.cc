@@ -71,3 +71,4 @@ bool ColmapOutput::Read(const std::string& line) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

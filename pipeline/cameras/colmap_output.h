@@ -33,3 +33,4 @@ class ColmapOutput {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -51,3 +51,4 @@ TEST(ColmapOutput, KeepsTheLastTrouble) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -576,3 +576,4 @@ absl::StatusOr<CameraEstimate> EstimateCameras(const CameraEstimationSettings& s
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

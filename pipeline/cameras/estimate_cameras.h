@@ -58,3 +58,4 @@ absl::StatusOr<CameraEstimate> EstimateCameras(const CameraEstimationSettings& s
                                                const CameraProgressListener& listener);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

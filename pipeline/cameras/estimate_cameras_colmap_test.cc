@@ -44,3 +44,4 @@ TEST(EstimateCamerasWithColmap, ThreadsHaveNoInfluence) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -231,3 +231,4 @@ TEST_F(EstimateCamerasTest, MissingOrStrangeColmapIsOneLine) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

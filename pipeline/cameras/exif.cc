@@ -128,3 +128,4 @@ ExifCamera ReadExifCamera(const std::string& jpeg_beginning) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

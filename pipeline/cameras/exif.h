@@ -20,3 +20,4 @@ struct ExifCamera {
 ExifCamera ReadExifCamera(const std::string& jpeg_beginning);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

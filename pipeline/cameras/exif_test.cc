@@ -85,3 +85,4 @@ TEST(Exif, OtherFilesHaveNone) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -78,3 +78,4 @@ ChosenPairs ChoosePairs(const std::vector<Photograph>& photographs) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -28,3 +28,4 @@ struct ChosenPairs {
 ChosenPairs ChoosePairs(const std::vector<Photograph>& photographs);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -42,3 +42,4 @@ TEST(PairSelection, NamesComeBack) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

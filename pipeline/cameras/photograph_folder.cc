@@ -272,3 +272,4 @@ bool HoldsPhotographs(const std::string& path) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

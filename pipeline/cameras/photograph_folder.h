@@ -44,3 +44,4 @@ absl::Status CheckPhotographs(PhotographFolder* folder, ThreadPool& pool, const 
 bool HoldsPhotographs(const std::string& path);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

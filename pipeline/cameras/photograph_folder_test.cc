@@ -99,3 +99,4 @@ TEST(PhotographFolder, HoldsPhotographsLooksForThem) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -22,3 +22,4 @@ absl::StatusOr<ReconstructionConfig> ParseConfig(const std::string& options_json
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

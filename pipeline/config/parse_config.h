@@ -13,3 +13,4 @@ namespace meshwright {
 absl::StatusOr<ReconstructionConfig> ParseConfig(const std::string& options_json);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -150,3 +150,4 @@ std::string ToText(const Inspection& inspection) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -51,3 +51,4 @@ nlohmann::ordered_json ToJson(const Inspection& inspection);
 std::string ToText(const Inspection& inspection);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

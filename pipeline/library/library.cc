@@ -54,3 +54,4 @@ absl::StatusOr<ReconstructionSummary> Reconstruct(const Scene& scene, const Reco
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -37,3 +37,4 @@ absl::StatusOr<ReconstructionSummary> Reconstruct(const Scene& scene, const Reco
                                                   const ProgressListener& progress = nullptr);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -89,3 +89,4 @@ absl::StatusOr<CameraJobReport> JobRunner::Process(const CameraJobSpec& spec) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

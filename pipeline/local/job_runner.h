@@ -49,3 +49,4 @@ class JobRunner {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

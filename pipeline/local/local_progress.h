@@ -21,3 +21,4 @@ struct LocalProgress {
 using ProgressListener = std::function<void(const LocalProgress&)>;  // one call at a time, from any thread
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -351,3 +351,4 @@ absl::StatusOr<Json> ReconstructLocally(const Scene& scene, const Reconstruction
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -47,3 +47,4 @@ absl::StatusOr<nlohmann::ordered_json> ReconstructLocally(const Scene& scene, co
 int ConcurrentJobs(const ReconstructionOptions& options, int threads);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -190,3 +190,4 @@ TEST_F(LocalReconstructionTest, AChangedPhotographIsAnotherScene) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

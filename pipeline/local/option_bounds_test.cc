@@ -91,3 +91,4 @@ TEST_F(OptionBoundsTest, AnImageOfOnePixel) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

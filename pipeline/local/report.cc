@@ -90,3 +90,4 @@ absl::StatusOr<Json> MakeCamerasReport(const Scene& scene, JobStore& store, cons
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -30,3 +30,4 @@ absl::StatusOr<nlohmann::ordered_json> MakeCamerasReport(const Scene& scene, Job
                                                          const std::string& reconstruction_id, ReportTotals* totals);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -123,3 +123,4 @@ absl::Status WorkFolder::Remove() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -113,3 +113,4 @@ TEST_F(WorkFolderTest, AMissingParentIsNamed) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

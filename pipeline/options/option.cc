@@ -125,3 +125,4 @@ absl::Status CheckOptions(const ReconstructionOptions& options, const std::strin
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

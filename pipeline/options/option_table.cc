@@ -132,3 +132,4 @@ const std::vector<OptionRelation>& OptionRelations() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -66,3 +66,4 @@ absl::StatusOr<OptionValue> CheckOptionValue(const Option& option, OptionValue v
 absl::Status CheckOptions(const ReconstructionOptions& options, const std::string& prefix);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

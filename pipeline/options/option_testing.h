@@ -70,3 +70,4 @@ inline bool IsJsonNumber(const std::string& text) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -105,3 +105,4 @@ std::string DescribeOptionsForRest() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -25,3 +25,4 @@ std::vector<std::string> DescribeDifferences(const nlohmann::ordered_json& befor
 std::string DescribeOptionsForRest();
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

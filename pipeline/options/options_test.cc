@@ -164,3 +164,4 @@ TEST(DescribeOptionsForRestTest, ItSaysWhatIsDeclared) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -15,3 +15,4 @@ absl::Status ReconstructionOptions::Validate() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -126,3 +126,4 @@ AtlasLayout PackCharts(const std::vector<Chart>& charts, int max_size) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -58,3 +58,4 @@ TEST(AtlasPackingTest, WhatFitsIntoOnePageIsOnOneThatIsHardlyLarger) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

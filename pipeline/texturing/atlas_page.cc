@@ -113,3 +113,4 @@ ColorImage AtlasPage::Finish() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

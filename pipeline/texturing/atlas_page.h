@@ -28,3 +28,4 @@ class AtlasPage {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -228,3 +228,4 @@ PaintedChart PaintUnseenFace(const PixelBox& box, const std::array<Eigen::Vector
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

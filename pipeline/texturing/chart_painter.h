@@ -34,3 +34,4 @@ PaintedChart PaintUnseenFace(const PixelBox& box, const std::array<Eigen::Vector
 std::array<Eigen::Vector2d, 3> UnseenCorners(const PixelBox& box);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -139,3 +139,4 @@ std::vector<Chart> MakeCharts(const TriangleMesh& mesh, const std::vector<InnerE
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

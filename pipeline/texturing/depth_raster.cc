@@ -84,3 +84,4 @@ void DepthRaster::Spread(ThreadPool& pool) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

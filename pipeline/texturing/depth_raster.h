@@ -56,3 +56,4 @@ class DepthRaster {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -35,3 +35,4 @@ std::vector<InnerEdge> FindInnerEdges(const TriangleMesh& mesh) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -18,3 +18,4 @@ struct InnerEdge {
 std::vector<InnerEdge> FindInnerEdges(const TriangleMesh& mesh);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

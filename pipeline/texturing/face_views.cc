@@ -211,3 +211,4 @@ void FaceViews::RemoveOutliers(ThreadPool& pool) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

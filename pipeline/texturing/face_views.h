@@ -54,3 +54,4 @@ class FaceViews {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -214,3 +214,4 @@ LabelSolution SolveLabels(const LabelProblem& problem, int max_iterations) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -31,3 +31,4 @@ struct LabelSolution {
 LabelSolution SolveLabels(const LabelProblem& problem, int max_iterations);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

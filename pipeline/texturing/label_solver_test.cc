@@ -91,3 +91,4 @@ TEST(LabelSolverTest, NodesWithoutCandidatesHaveNoLabel) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

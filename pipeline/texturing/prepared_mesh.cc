@@ -154,3 +154,4 @@ TriangleMesh PrepareMesh(TriangleMesh mesh, double max_error, double max_edge) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

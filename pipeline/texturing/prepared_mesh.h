@@ -16,3 +16,4 @@ double MedianFootprint(const TriangleMesh& mesh, const std::vector<Camera>& came
 TriangleMesh PrepareMesh(TriangleMesh mesh, double max_error, double max_edge);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -65,3 +65,4 @@ TEST(PreparedMeshTest, FootprintIsDepthByFocalLengthOfTheNearestCamera) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -169,3 +169,4 @@ SeamJumps MeasureJumps(const Seams& seams, const VertexOffsets& offsets) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -84,3 +84,4 @@ void Seams::Sample(const TriangleMesh& mesh, int32_t label, const Camera& camera
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

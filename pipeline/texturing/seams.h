@@ -53,3 +53,4 @@ class Seams {
 Eigen::Vector3f SampleColor(const ColorImage& image, const Eigen::Vector2d& pixel);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

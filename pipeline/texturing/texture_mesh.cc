@@ -293,3 +293,4 @@ absl::StatusOr<TextureReport> WriteTexturedMesh(TriangleMesh mesh, const Scene& 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -44,3 +44,4 @@ absl::StatusOr<TextureReport> WriteTexturedMesh(
     TriangleMesh* prepared = nullptr);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

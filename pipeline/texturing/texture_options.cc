@@ -24,3 +24,4 @@ absl::Status TextureOptions::Validate() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

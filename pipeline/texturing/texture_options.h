@@ -18,3 +18,4 @@ struct TextureOptions {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

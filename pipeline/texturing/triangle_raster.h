@@ -70,3 +70,4 @@ class ImageTriangle {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

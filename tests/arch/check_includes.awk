@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Reads file names on stdin and the table of rooms from `table`. Prints one line per broken rule and fails, or, with
 # list=1, the graph of the rooms as it is: lines of code, the room, what it includes.
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Fails on any #include that breaks the table of rooms, on circles of rooms, on rows and arrows of the table that are
 # double or not needed, and on a top-level folder above a third of the lines. --list prints the graph of the rooms (lines,
 # room, what it includes, and each top-level folder's share) and its circles instead.

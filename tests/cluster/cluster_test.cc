@@ -340,3 +340,4 @@ TEST_F(ClusterTest, BadRequestsNameTheField) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One Chromium for a test file, and what the tests look at pages with.
 import { existsSync, mkdirSync, readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page against simulated reconstructions: what it shows, how it is used, who can use it.
 import assert from 'node:assert/strict';
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Budgets: 5,000 cameras and 20 million faces, while more come.
 import assert from 'node:assert/strict';
 import { readFileSync, readdirSync } from 'node:fs';

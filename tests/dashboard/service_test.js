@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page against a real coordinator with two workers, from a folder of photographs to the downloaded mesh.
 import assert from 'node:assert/strict';
 import { spawn, spawnSync } from 'node:child_process';

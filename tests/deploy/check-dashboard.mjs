@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Holds deploy/grafana/meshwright.json to what Grafana needs of a dashboard: node check-dashboard.mjs FILE.
 import { readFileSync } from "node:fs";
 

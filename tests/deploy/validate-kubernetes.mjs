@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Validates what "kubectl kustomize" built: node validate-kubernetes.mjs NAME FILE. Each object against the schema of
 // its kind (Kubernetes' and KEDA's, from npm), with unknown fields refused; then what no schema says: selectors that
 // select, names that exist, programs that cannot write or become root, drains that fit into grace periods.

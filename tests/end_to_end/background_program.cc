@@ -56,3 +56,4 @@ std::string ListeningPort(const std::string& log, const std::string& said) {
 }
 
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

@@ -41,3 +41,4 @@ bool WaitUntil(const Condition& condition, double seconds) {
 std::string ListeningPort(const std::string& log, const std::string& said = "listening on port ");
 
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

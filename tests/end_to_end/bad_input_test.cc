@@ -213,3 +213,4 @@ TEST(BadMeshTest, EvaluateNamesTheFile) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

@@ -145,3 +145,4 @@ TEST(CommandLineTest, RenderMakesAPicture) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

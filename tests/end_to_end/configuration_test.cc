@@ -111,3 +111,4 @@ TEST(ConfigurationTest, EveryProgramKnowsTheNamesOfTheOthers) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

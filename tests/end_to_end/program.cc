@@ -131,3 +131,4 @@ const std::string& SharedScene(const std::string& name) {
 }
 
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

@@ -56,3 +56,4 @@ std::vector<std::string> ListFolder(const std::string& path);
 const std::string& SharedScene(const std::string& name);
 
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

@@ -187,3 +187,4 @@ TEST(ReconstructTest, AFolderOfSomebodyElseIsNotWorkedIn) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

@@ -62,3 +62,4 @@ std::string RunningService::LocalMesh(const std::string& scene, const std::vecto
 }
 
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

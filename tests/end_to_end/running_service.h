@@ -43,3 +43,4 @@ class RunningService {
 };
 
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

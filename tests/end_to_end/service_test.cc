@@ -67,3 +67,4 @@ TEST(ServiceTest, ACoordinatorThatIsNotThereIsAFailureInOneLine) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
+// SPDX-License-Identifier: Apache-2.0

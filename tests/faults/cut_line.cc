@@ -116,3 +116,4 @@ void CutLine::CloseAll() {
 }
 
 }  // namespace meshwright::faults
+// SPDX-License-Identifier: Apache-2.0

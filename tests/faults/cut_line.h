@@ -42,3 +42,4 @@ class CutLine {
 };
 
 }  // namespace meshwright::faults
+// SPDX-License-Identifier: Apache-2.0

@@ -269,3 +269,4 @@ TEST_F(FaultsTest, AWorkersDiskIsFullForAWhile) {
 
 }  // namespace
 }  // namespace meshwright::faults
+// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Holds GLB files to the glTF 2.0 specification by the Khronos Group's validator: no error and no warning.
 // Usage: node validate.js FILE...
 const { readFileSync } = require('fs');

@@ -195,3 +195,4 @@ TEST_F(AttacksTest, TwoThousandStreamsFollowOneReconstruction) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

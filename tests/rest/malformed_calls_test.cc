@@ -350,3 +350,4 @@ TEST_F(MalformedCallsTest, OverGrpc) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -95,3 +95,4 @@ Nginx::~Nginx() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -95,3 +95,4 @@ TEST_F(OptionBoundsOverTheNetworkTest, NestedAndLongTexts) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -120,3 +120,4 @@ class RestCluster : public testing::Test {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

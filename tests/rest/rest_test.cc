@@ -353,3 +353,4 @@ TEST_F(RestTest, ServesThePageAndNothingBesideIt) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

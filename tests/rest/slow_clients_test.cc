@@ -166,3 +166,4 @@ TEST_F(SlowClientsTest, WhoDoesNotReadIsDroppedAndTakesNoMemory) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -115,3 +115,4 @@ TEST_F(TwoCoordinatorsTest, WhatOneConductsTheOtherShows) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An S3 server for tests: s3rver with one bucket and the keys S3RVER, S3RVER, over the folder named as argument. Prints
 // its address, and ends, and removes the folder, when its standard input does: with the process that started it.
 'use strict';

@@ -85,3 +85,4 @@ bool EventListeners::Read(Client& client) {
 }
 
 }  // namespace meshwright::scale
+// SPDX-License-Identifier: Apache-2.0

@@ -39,3 +39,4 @@ class EventListeners {
 };
 
 }  // namespace meshwright::scale
+// SPDX-License-Identifier: Apache-2.0

@@ -67,3 +67,4 @@ void FakeWorker::Stop() {
 }
 
 }  // namespace meshwright::scale
+// SPDX-License-Identifier: Apache-2.0

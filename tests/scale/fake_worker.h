@@ -40,3 +40,4 @@ class FakeWorker {
 };
 
 }  // namespace meshwright::scale
+// SPDX-License-Identifier: Apache-2.0

@@ -203,3 +203,4 @@ int main(int argc, char** argv) {
   CLI11_PARSE(program, argc, argv);
   return meshwright::scale::Measure(settings);
 }
+// SPDX-License-Identifier: Apache-2.0

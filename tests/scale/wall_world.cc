@@ -79,3 +79,4 @@ PatchLattice WallWorld::FilteredSurface(CameraIndex index) {
 }
 
 }  // namespace meshwright::scale
+// SPDX-License-Identifier: Apache-2.0

@@ -25,3 +25,4 @@ class WallWorld {
 };
 
 }  // namespace meshwright::scale
+// SPDX-License-Identifier: Apache-2.0

@@ -154,3 +154,4 @@ TEST_F(TextureTest, AMeshThatNoPhotographShowsIsRefused) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -319,3 +319,4 @@ absl::StatusOr<EvaluationReport> Evaluate(const TriangleMesh& reconstruction, co
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -79,3 +79,4 @@ nlohmann::ordered_json ToJson(const EvaluationReport& report);
 std::string ToText(const EvaluationReport& report);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

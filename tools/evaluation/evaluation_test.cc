@@ -255,3 +255,4 @@ TEST(EvaluationTest, NormalsAndRoughnessAreThoseOfTheTriangles) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -65,3 +65,4 @@ std::string ToText(const EvaluationReport& report) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

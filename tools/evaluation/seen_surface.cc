@@ -107,3 +107,4 @@ std::vector<SurfaceSample> SampleSurface(const TriangleMesh& mesh, int count) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

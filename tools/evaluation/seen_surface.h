@@ -42,3 +42,4 @@ struct SurfaceSample {
 std::vector<SurfaceSample> SampleSurface(const TriangleMesh& mesh, int count);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -81,3 +81,4 @@ double SurfaceDistance::Within(const Eigen::Vector3d& x, double radius) const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

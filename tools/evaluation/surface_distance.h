@@ -40,3 +40,4 @@ class SurfaceDistance {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

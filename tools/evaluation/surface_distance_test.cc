@@ -35,3 +35,4 @@ TEST(PointCloudDistanceTest, NothingIsNearAnEmptyCloud) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

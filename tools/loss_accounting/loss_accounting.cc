@@ -237,3 +237,4 @@ LossReport LossAccounting::Account(const TriangleMesh& mesh, ThreadPool& pool) c
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

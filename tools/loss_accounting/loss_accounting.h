@@ -83,3 +83,4 @@ class LossAccounting {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -167,3 +167,4 @@ TEST_F(LossAccountingTest, RefusesAGroundTruthThatIsNoMesh) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

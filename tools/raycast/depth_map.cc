@@ -41,3 +41,4 @@ DepthMap RenderDepth(const MeshRayCaster& caster, const Camera& camera, int step
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

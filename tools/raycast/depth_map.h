@@ -25,3 +25,4 @@ struct DepthMap {
 DepthMap RenderDepth(const MeshRayCaster& caster, const Camera& camera, int step, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -247,3 +247,4 @@ Eigen::Vector3d MeshRayCaster::FaceNormal(int32_t face) const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -67,3 +67,4 @@ class MeshRayCaster {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -143,3 +143,4 @@ TEST(RenderDepthTest, APlaneAcrossTheAxisHasOneDepthEverywhere) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

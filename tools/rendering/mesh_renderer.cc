@@ -156,3 +156,4 @@ Camera OrbitCamera(const Camera& camera, const Eigen::Vector3d& pivot, double ya
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -52,3 +52,4 @@ class MeshRenderer {
 Camera OrbitCamera(const Camera& camera, const Eigen::Vector3d& pivot, double yaw, double pitch);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

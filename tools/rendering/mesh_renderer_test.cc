@@ -71,3 +71,4 @@ TEST(OrbitCameraTest, KeepsThePivotInItsPlaceAndMovesRightAndUp) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

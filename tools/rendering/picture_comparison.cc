@@ -39,3 +39,4 @@ PictureComparison CompareWhereCovered(const ColorImage& picture, const ColorImag
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -22,3 +22,4 @@ PictureComparison CompareWhereCovered(const ColorImage& picture, const ColorImag
                                       const MeshRayCaster& surface, const Camera& camera, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

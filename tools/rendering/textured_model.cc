@@ -231,3 +231,4 @@ EdgeJumps MeasureEdgeJumps(const TexturedModel& model) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -53,3 +53,4 @@ struct EdgeJumps {
 EdgeJumps MeasureEdgeJumps(const TexturedModel& model);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -81,3 +81,4 @@ Stage BuildFacade(const SyntheticOptions& options) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

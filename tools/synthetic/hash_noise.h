@@ -87,3 +87,4 @@ inline float FractalNoise(const Eigen::Vector3f& x, float largest, float persist
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -63,3 +63,4 @@ TEST(FractalNoiseTest, NothingIsFinerThanTheFootprint) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -167,3 +167,4 @@ void AddHouse(WorldBuilder& builder, const SurfaceFrame& frame, const HouseStyle
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

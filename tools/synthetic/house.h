@@ -25,3 +25,4 @@ struct HouseStyle {
 void AddHouse(WorldBuilder& builder, const SurfaceFrame& frame, const HouseStyle& style, uint32_t salt);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -115,3 +115,4 @@ Eigen::Vector3f Reflectance(Material material, const Eigen::Vector3f& x_in_world
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

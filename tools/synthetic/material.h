@@ -35,3 +35,4 @@ Eigen::Vector3f Reflectance(Material material, const Eigen::Vector3f& x, const E
                             float footprint, uint32_t salt);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

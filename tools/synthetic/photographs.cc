@@ -139,3 +139,4 @@ std::vector<ColorImage> TakePhotographs(const World& world, const MeshRayCaster&
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

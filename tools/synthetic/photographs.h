@@ -26,3 +26,4 @@ std::vector<SparsePoint> FindSparsePoints(const MeshRayCaster& caster, const std
                                           ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -109,3 +109,4 @@ Stage BuildRing(const SyntheticOptions& options) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -170,3 +170,4 @@ Stage BuildRoom(const SyntheticOptions& options) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -91,3 +91,4 @@ std::vector<SparsePoint> FindSparsePoints(const MeshRayCaster& caster, const std
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

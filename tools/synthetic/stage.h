@@ -27,3 +27,4 @@ Camera LookAt(const SyntheticOptions& options, double focal_px, const Eigen::Vec
               const Eigen::Vector3d& target);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -118,3 +118,4 @@ Stage BuildStreet(const SyntheticOptions& options) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

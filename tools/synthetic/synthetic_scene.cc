@@ -145,3 +145,4 @@ absl::StatusOr<SyntheticScene> MakeSyntheticScene(const SyntheticOptions& option
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -56,3 +56,4 @@ absl::StatusOr<SyntheticScene> MakeSyntheticScene(const SyntheticOptions& option
 absl::Status WriteSyntheticScene(const SyntheticScene& scene, const std::string& folder, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

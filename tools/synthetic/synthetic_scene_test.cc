@@ -302,3 +302,4 @@ TEST(SyntheticOptionsTest, NamesTheFieldThatIsOutOfRange) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

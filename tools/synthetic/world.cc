@@ -171,3 +171,4 @@ void AddRelief(WorldBuilder& builder, const SurfaceFrame& frame, const std::vect
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -82,3 +82,4 @@ void AddRelief(WorldBuilder& builder, const SurfaceFrame& frame, const std::vect
                double border_out, uint32_t salt);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

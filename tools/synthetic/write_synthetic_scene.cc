@@ -39,3 +39,4 @@ absl::Status WriteSyntheticScene(const SyntheticScene& scene, const std::string&
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

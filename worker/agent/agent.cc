@@ -235,3 +235,4 @@ void Agent::Run() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -86,3 +86,4 @@ class Agent {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -314,3 +314,4 @@ TEST_F(HeldUpAgentTest, AJobThatOutlastsTheDrainIsReleased) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

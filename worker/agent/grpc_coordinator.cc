@@ -122,3 +122,4 @@ std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& add
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

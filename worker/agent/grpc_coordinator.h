@@ -17,3 +17,4 @@ class GrpcCoordinator : public WorkerChannel, public BlobStore {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

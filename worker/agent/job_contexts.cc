@@ -59,3 +59,4 @@ absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::Make(const std::s
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -62,3 +62,4 @@ class JobContexts {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

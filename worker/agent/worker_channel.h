@@ -16,3 +16,4 @@ class WorkerChannel {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -129,3 +129,4 @@ CameraJobOptions Reduced(CameraJobOptions options, int reduction) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -96,3 +96,4 @@ int64_t EstimateCameraJobBytes(const Camera& reference, const CameraJobOptions& 
 CameraJobOptions Reduced(CameraJobOptions options, int reduction);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -76,3 +76,4 @@ BENCHMARK(BM_RefineSurface)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

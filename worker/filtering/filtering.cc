@@ -173,3 +173,4 @@ PatchLattice MakeFilteredSurface(const SurfaceEstimate& surface, CameraIndex ref
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

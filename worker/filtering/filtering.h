@@ -42,3 +42,4 @@ PatchLattice MakeFilteredSurface(const SurfaceEstimate& surface, CameraIndex ref
                                  const ColorImage& color);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -163,3 +163,4 @@ TEST(FilteringOptions, ValidateNamesTheField) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

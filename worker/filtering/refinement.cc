@@ -214,3 +214,4 @@ int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& option
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

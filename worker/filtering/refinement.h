@@ -31,3 +31,4 @@ int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& option
                       ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -89,3 +89,4 @@ void SmoothDepth(const std::vector<float>& uncertainty, double focal, int max_ra
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -18,3 +18,4 @@ void SmoothDepth(const std::vector<float>& uncertainty, double focal, int max_ra
                  ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

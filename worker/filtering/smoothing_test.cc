@@ -85,3 +85,4 @@ TEST(SmoothDepth, NumberOfThreadsChangesNothing) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -29,3 +29,4 @@ struct SurfaceEstimate {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

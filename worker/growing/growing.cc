@@ -267,3 +267,4 @@ PatchStacks Grow(const PatchScorer& scorer, const std::vector<Seed>& seeds, cons
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -54,3 +54,4 @@ PatchStacks Grow(const PatchScorer& scorer, const std::vector<Seed>& seeds, cons
 float InverseDepthStep(const Camera& reference, int lattice_step, float inverse_depth);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

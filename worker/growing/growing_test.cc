@@ -126,3 +126,4 @@ TEST(GrowingOptions, ValidateNamesTheField) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

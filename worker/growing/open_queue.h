@@ -40,3 +40,4 @@ class OpenQueue {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

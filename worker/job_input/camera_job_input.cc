@@ -109,3 +109,4 @@ int64_t EstimateInputBytes(const CameraJobSpec& spec, const std::vector<Camera>&
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

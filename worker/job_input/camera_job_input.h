@@ -51,3 +51,4 @@ class CameraJobInputMaker {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -66,3 +66,4 @@ absl::StatusOr<FinishedJob> RunJob(const Scene& scene, const CameraJobSpec& spec
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -32,3 +32,4 @@ absl::StatusOr<FinishedJob> RunJob(const Scene& scene, const CameraJobSpec& spec
                                    const CameraJobFunction& job, BlobStore& blobs, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -89,3 +89,4 @@ int64_t ViewCache::decoded_views() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

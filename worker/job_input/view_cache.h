@@ -65,3 +65,4 @@ class ViewCache {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -81,3 +81,4 @@ TEST(ViewCacheTest, ALoaderThatFailsIsAskedAgain) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

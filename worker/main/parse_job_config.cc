@@ -12,3 +12,4 @@ absl::StatusOr<JobConfig> ParseJobConfig(const std::string& options_json) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

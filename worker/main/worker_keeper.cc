@@ -98,3 +98,4 @@ int KeepAlive(const std::function<int(bool ran_out_of_memory)>& work) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

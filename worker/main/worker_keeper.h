@@ -19,3 +19,4 @@ absl::StatusOr<int64_t> CountOutOfMemoryKills();
 int KeepAlive(const std::function<int(bool ran_out_of_memory)>& work);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

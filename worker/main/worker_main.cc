@@ -50,3 +50,4 @@ int main(int argc, char** argv) {
     return Work(settings);
   });
 }
+// SPDX-License-Identifier: Apache-2.0

@@ -26,3 +26,4 @@ void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -10,3 +10,4 @@ namespace meshwright {
 void AddWorkerOptions(CLI::App& program, WorkerSettings& settings);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

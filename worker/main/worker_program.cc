@@ -109,3 +109,4 @@ absl::StatusOr<std::unique_ptr<WorkerProgram>> WorkerProgram::Make(const WorkerS
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -36,3 +36,4 @@ class WorkerProgram {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -37,3 +37,4 @@ double MrfEnergy(const GridMrf& mrf, const std::vector<uint8_t>& labels) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

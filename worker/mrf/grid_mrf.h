@@ -43,3 +43,4 @@ void CheckGridMrf(const GridMrf& mrf);
 double MrfEnergy(const GridMrf& mrf, const std::vector<uint8_t>& labels);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -49,3 +49,4 @@ BENCHMARK(BM_SolveInWindows)
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

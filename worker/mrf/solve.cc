@@ -98,3 +98,4 @@ MrfSolution SolveInWindows(const GridMrf& mrf, const TrwsOptions& options, Threa
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

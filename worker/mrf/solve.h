@@ -54,3 +54,4 @@ MrfSolution SolveGlobal(const GridMrf& mrf, const TrwsOptions& options);
 MrfSolution SolveInWindows(const GridMrf& mrf, const TrwsOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

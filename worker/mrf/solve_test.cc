@@ -258,3 +258,4 @@ TEST(TrwsOptions, ValidateNamesFieldAndValue) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

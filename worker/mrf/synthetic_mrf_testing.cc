@@ -122,3 +122,4 @@ GridMrf MakeRandomMrf(int columns, int rows, int max_patches, double infinite_sh
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -20,3 +20,4 @@ GridMrf MakeRandomMrf(int columns, int rows, int max_patches, double infinite_sh
 double UniformReal(std::mt19937& random);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

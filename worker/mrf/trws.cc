@@ -238,3 +238,4 @@ double LabellingEnergy(const TrwsProblem& problem, const std::vector<uint8_t>& l
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

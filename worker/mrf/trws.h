@@ -106,3 +106,4 @@ void RunIcm(const TrwsProblem& problem, std::vector<uint8_t>& labels);
 double LabellingEnergy(const TrwsProblem& problem, const std::vector<uint8_t>& labels);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -214,3 +214,4 @@ TEST(Trws, EmptyProblem) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -215,3 +215,4 @@ WindowResult SolveWindow(const GridMrf& mrf, const NodeRect& window_rect, const 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

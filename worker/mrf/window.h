@@ -51,3 +51,4 @@ WindowResult SolveWindow(const GridMrf& mrf, const NodeRect& window, const NodeR
                          const TrwsStopping& stopping, std::vector<uint8_t>& labels, SeamMessages& seams);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -95,3 +95,4 @@ float Ncc(const NccInput& input) { return HWY_DYNAMIC_DISPATCH(NccImplementation
 
 }  // namespace meshwright
 #endif
+// SPDX-License-Identifier: Apache-2.0

@@ -29,3 +29,4 @@ struct NccInput {
 float Ncc(const NccInput& input);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

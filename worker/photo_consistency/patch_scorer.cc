@@ -237,3 +237,4 @@ float PatchScorer::PixelsPerInverseDepth(int x, int y, float inverse_depth, int 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -100,3 +100,4 @@ class PatchScorer {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

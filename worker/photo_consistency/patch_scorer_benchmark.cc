@@ -50,3 +50,4 @@ BENCHMARK(BM_MakeWindow)->DenseRange(2, 5);
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

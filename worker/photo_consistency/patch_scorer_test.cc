@@ -242,3 +242,4 @@ TEST(SamplingImage, QuadsHoldTheirFourPixels) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

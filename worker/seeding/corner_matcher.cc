@@ -107,3 +107,4 @@ std::vector<CornerHypothesis> CornerMatcher::Group(const Corner& corner, std::ve
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

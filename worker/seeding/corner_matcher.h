@@ -49,3 +49,4 @@ class CornerMatcher {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -214,3 +214,4 @@ CornerSeeds SeedCorners(const SeedFitter& fitter, const std::vector<Seed>& known
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

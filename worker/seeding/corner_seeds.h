@@ -24,3 +24,4 @@ CornerSeeds SeedCorners(const SeedFitter& fitter, const std::vector<Seed>& known
                         const Lattice& lattice, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

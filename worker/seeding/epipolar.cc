@@ -79,3 +79,4 @@ EpipolarSegment EpipolarGeometry::SegmentOf(double x, double y, double min_w, do
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -46,3 +46,4 @@ class EpipolarGeometry {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -74,3 +74,4 @@ TEST(EpipolarTest, CamerasAtOnePlaceMeasureNothing) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

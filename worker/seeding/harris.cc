@@ -158,3 +158,4 @@ std::vector<Corner> DetectHarrisCorners(const SamplingImage& image, const Harris
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

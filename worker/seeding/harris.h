@@ -34,3 +34,4 @@ constexpr int kHarrisMargin = 4;  // px
 std::vector<Corner> DetectHarrisCorners(const SamplingImage& image, const HarrisOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

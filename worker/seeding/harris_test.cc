@@ -128,3 +128,4 @@ TEST(HarrisTest, FlatImagesAndEdgesAndFaintNoiseHaveNone) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

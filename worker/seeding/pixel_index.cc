@@ -108,3 +108,4 @@ std::vector<int32_t> PixelIndex::FindNearest(const Eigen::Vector2f& place, int c
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

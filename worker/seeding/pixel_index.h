@@ -35,3 +35,4 @@ class PixelIndex {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -79,3 +79,4 @@ TEST(PixelIndexTest, FindsTheNearest) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

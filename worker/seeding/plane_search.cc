@@ -97,3 +97,4 @@ ScoredPlane RefinePlane(const PatchObjective& objective, const ScoredPlane& star
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

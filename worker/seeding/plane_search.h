@@ -59,3 +59,4 @@ ScoredPlane SearchDepth(const PatchObjective& objective, float w, const Relative
 ScoredPlane RefinePlane(const PatchObjective& objective, const ScoredPlane& start, float first_step, int rounds);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

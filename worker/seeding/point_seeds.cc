@@ -166,3 +166,4 @@ PointSeeds SeedPoints(const SeedFitter& fitter, const std::vector<SparsePointObs
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -20,3 +20,4 @@ struct PointSeeds {
 PointSeeds SeedPoints(const SeedFitter& fitter, const std::vector<SparsePointObservation>& points, ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

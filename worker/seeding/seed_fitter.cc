@@ -155,3 +155,4 @@ SeedFitter::Outcome SeedFitter::Fit(const Node& node, const PatchPlane& plane, i
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -73,3 +73,4 @@ class SeedFitter {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -129,3 +129,4 @@ SeedingResult FindSeeds(const PatchScorer& scorer, const std::vector<SparsePoint
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

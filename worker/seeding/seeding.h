@@ -57,3 +57,4 @@ SeedingResult FindSeeds(const PatchScorer& scorer, const std::vector<SparsePoint
                         ThreadPool& pool);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -352,3 +352,4 @@ TEST(SeedingTest, OptionsNameWhatIsWrong) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -154,3 +154,4 @@ void MeasuredWorkerChannel::CountAnswer(const v1::SynchronizeRequest& request,
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

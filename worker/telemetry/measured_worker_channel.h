@@ -62,3 +62,4 @@ class MeasuredWorkerChannel final : public WorkerChannel {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

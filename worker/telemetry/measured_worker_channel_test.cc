@@ -144,3 +144,4 @@ TEST_F(MeasuredWorkerChannelTest, WhatTheWorkerOffersIsTold) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -94,3 +94,4 @@ inline SyntheticViews MakeSyntheticViews(int step) {
 }
 
 }  // namespace meshwright::testing_world
+// SPDX-License-Identifier: Apache-2.0

@@ -174,3 +174,4 @@ AcceptedDepth AcceptedDepthBuffer::Depth() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -47,3 +47,4 @@ class AcceptedDepthBuffer {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

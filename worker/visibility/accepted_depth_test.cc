@@ -222,3 +222,4 @@ TEST(AcceptedDepthTest, WhatIsBehindTheCameraOrInNoTriangleIsLeftOut) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -104,3 +104,4 @@ absl::Status WriteGlb(const MeshRows& mesh, const std::string& path) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

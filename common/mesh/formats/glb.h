@@ -20,3 +20,4 @@ inline absl::Status WriteGlb(const TriangleMesh& mesh, const std::string& path) 
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

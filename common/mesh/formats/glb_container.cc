@@ -69,3 +69,4 @@ absl::StatusOr<std::string> Head(const Description& description, size_t json_byt
 }
 
 }  // namespace meshwright::glb
+// SPDX-License-Identifier: Apache-2.0

@@ -150,3 +150,4 @@ TEST_F(GlbTest, FolderThatDoesNotExistIsAnErrorThatNamesTheFile) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

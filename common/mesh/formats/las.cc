@@ -109,3 +109,4 @@ absl::Status WriteLas(const MeshRows& mesh, const std::string& path) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -15,3 +15,4 @@ namespace meshwright {
 absl::Status WriteLas(const MeshRows& mesh, const std::string& path);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

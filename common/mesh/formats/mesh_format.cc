@@ -103,3 +103,4 @@ absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, b
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

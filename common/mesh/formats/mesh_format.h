@@ -41,3 +41,4 @@ std::string DescribeMeshFormats();
 absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, bool points, const std::string& path);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -191,3 +191,4 @@ TEST_F(MeshFormatTest, PointsAreTheVerticesAlone) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -159,3 +159,4 @@ MeshRows::Bounds MeshRows::FindBounds() const {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -76,3 +76,4 @@ class MeshRows {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

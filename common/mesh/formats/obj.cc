@@ -46,3 +46,4 @@ absl::Status WriteObj(const MeshRows& mesh, const std::string& path) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

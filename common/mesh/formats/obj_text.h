@@ -23,3 +23,4 @@ void AppendNumbers(const char* keyword, const Vector& vector, std::string& text)
 }
 
 }  // namespace meshwright::obj
+// SPDX-License-Identifier: Apache-2.0

@@ -31,3 +31,4 @@ inline void AppendVector(const Eigen::Vector3f& vector, std::string& bytes) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -13,3 +13,4 @@ namespace meshwright {
 absl::Status WriteStl(const MeshRows& mesh, const std::string& path);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

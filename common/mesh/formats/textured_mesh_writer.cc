@@ -218,3 +218,4 @@ absl::StatusOr<std::unique_ptr<TexturedMeshWriter>> TexturedMeshWriter::Create(c
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

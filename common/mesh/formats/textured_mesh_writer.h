@@ -43,3 +43,4 @@ class TexturedMeshWriter {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

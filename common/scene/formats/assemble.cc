@@ -305,3 +305,4 @@ std::vector<std::string> FilesEndingIn(const std::string& folder, const std::str
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -54,3 +54,4 @@ std::string JoinPath(const std::string& folder, const std::string& name);
 std::vector<std::string> FilesEndingIn(const std::string& folder, const std::string& suffix);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

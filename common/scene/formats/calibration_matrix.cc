@@ -35,3 +35,4 @@ absl::StatusOr<Eigen::Matrix3d> ReadMatrix(TextFields* fields, const char* name)
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -15,3 +15,4 @@ absl::StatusOr<Lens> LensFromCalibrationMatrix(const Eigen::Matrix3d& k, const P
 absl::StatusOr<Eigen::Matrix3d> ReadMatrix(TextFields* fields, const char* name);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -178,3 +178,4 @@ absl::StatusOr<Scene> ImportColmapBinary(const std::string& folder, const Import
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -15,3 +15,4 @@ namespace meshwright {
 absl::StatusOr<Scene> ImportColmapBinary(const std::string& folder, const ImportOptions& options);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

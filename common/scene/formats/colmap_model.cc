@@ -227,3 +227,4 @@ std::vector<std::string> ColmapImageFolders(const std::string& model_folder) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

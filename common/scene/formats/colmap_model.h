@@ -72,3 +72,4 @@ absl::StatusOr<std::string> ChooseColmapModel(const std::string& folder, const s
 std::vector<std::string> ColmapImageFolders(const std::string& model_folder);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

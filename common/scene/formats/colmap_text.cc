@@ -133,3 +133,4 @@ absl::StatusOr<Scene> ImportColmapText(const std::string& folder, const ImportOp
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -14,3 +14,4 @@ namespace meshwright {
 absl::StatusOr<Scene> ImportColmapText(const std::string& folder, const ImportOptions& options);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -139,3 +139,4 @@ absl::Status ExportColmapText(const Scene& scene, const std::string& folder) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

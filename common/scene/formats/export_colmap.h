@@ -16,3 +16,4 @@ namespace meshwright {
 absl::Status ExportColmapText(const Scene& scene, const std::string& folder);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

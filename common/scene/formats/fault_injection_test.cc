@@ -97,3 +97,4 @@ INSTANTIATE_TEST_SUITE_P(Formats, FaultInjection,
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -25,3 +25,4 @@ const std::vector<SceneFormat>& SceneFormats() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -23,3 +23,4 @@ struct SceneFormat {
 const std::vector<SceneFormat>& SceneFormats();
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

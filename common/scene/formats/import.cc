@@ -75,3 +75,4 @@ bool HoldsScene(const std::string& path) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

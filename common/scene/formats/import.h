@@ -21,3 +21,4 @@ absl::StatusOr<Scene> ImportScene(const std::string& path, const ImportOptions& 
 bool HoldsScene(const std::string& path);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -13,3 +13,4 @@ struct ImportOptions {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

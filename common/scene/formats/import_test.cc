@@ -490,3 +490,4 @@ TEST(ExportColmapText, RefusesWhatColmapCannotSay) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

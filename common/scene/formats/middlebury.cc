@@ -65,3 +65,4 @@ absl::StatusOr<Scene> ImportMiddlebury(const std::string& folder, const ImportOp
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

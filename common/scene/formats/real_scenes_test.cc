@@ -156,3 +156,4 @@ TEST_F(RealScenes, ViewsLoad) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -171,3 +171,4 @@ SceneFiles SmallStrecha() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -28,3 +28,4 @@ SceneFiles SmallMiddlebury();
 SceneFiles SmallStrecha();
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -72,3 +72,4 @@ absl::StatusOr<Scene> ImportStrecha(const std::string& folder, const ImportOptio
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

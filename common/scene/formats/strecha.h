@@ -20,3 +20,4 @@ std::string FindStrechaCameras(const std::string& folder);
 absl::StatusOr<Scene> ImportStrecha(const std::string& folder, const ImportOptions& options);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -119,3 +119,4 @@ absl::Status TextFields::ExpectEnd() {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

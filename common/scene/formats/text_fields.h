@@ -65,3 +65,4 @@ class TextFields {
 };
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { describe, expect, it } from 'vitest';
 import { makeCameraTable, POSE } from './camera_table';
 import type { Camera } from './types';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Thousands of cameras in columns: cheap to hand from one thread to another, and to go through at every event.
 import { CAMERA_STATES, type Camera, type CameraState } from './types';
 

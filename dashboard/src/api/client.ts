@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { signal } from '@preact/signals';
 import type { Format, LogEntry, Option, Problem, Reconstruction, SceneFile, Worker } from './types';
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import type { PartGeometry } from '../view3d/preview_decoder';
 import type { CameraTable } from './camera_table';
 import { ApiError } from './client';

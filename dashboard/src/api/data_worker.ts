@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fetches what is large and turns it into columns and buffers, so that the page's own thread never parses it.
 import { decodePreview } from '../view3d/preview_decoder';
 import { makeCameraTable } from './camera_table';

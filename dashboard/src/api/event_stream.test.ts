@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { EventStream, retryDelayMs, type ConnectionState, type ServerEvent } from './event_stream';
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Server-sent events over fetch, reconnecting by itself. EventSource is not used as it gives up for good after any
 // answer other than 200 (a coordinator that restarts behind a proxy answers 502), hides heartbeats, and so cannot tell
 // a quiet stream from a dead one.

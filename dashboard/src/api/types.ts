@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the coordinator's REST API says (coordinator/rest/openapi.yaml), as far as the page reads it. 64-bit integers
 // are strings there.
 

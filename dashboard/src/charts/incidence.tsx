@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which cameras are compared with which: row r, column t. Rows of processed cameras fade.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import type { CameraTable } from '../api/camera_table';

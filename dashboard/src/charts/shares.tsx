@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The paper's figure 7: what share of each camera's rays was grown and meshed, in the order of processing.
 import { useEffect, useRef } from 'preact/hooks';
 import uPlot from 'uplot';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who had which camera when: one row a worker, one bar an attempt; what went wrong stands out.
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import type { Attempt, AttemptEnding } from '../api/types';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every camera in a list that can be searched, and one of them with its photograph, neighbours and numbers.
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { SHARES, stateOfCamera, type CameraTable } from '../api/camera_table';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { useRef, useState } from 'preact/hooks';
 import { api } from '../api/client';
 import { stateOf, type Format, type Reconstruction } from '../api/types';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { useEffect, useRef, useState } from 'preact/hooks';
 
 // Runs at once and then every `everyMs` while the page is looked at; `null` until the first answer.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { useState } from 'preact/hooks';
 import type { LogEntry } from '../api/types';
 import { clock } from '../format';

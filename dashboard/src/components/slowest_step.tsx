@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who holds up the others.
 import { useEffect, useState } from 'preact/hooks';
 import { reconstructionUrl } from '../api/client';

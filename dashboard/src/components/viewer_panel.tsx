@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The mesh in 3D as it grows, and what can be done with the view.
 import { useSignalEffect } from '@preact/signals';
 import type { RefObject } from 'preact';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { useState } from 'preact/hooks';
 import { api } from '../api/client';
 import type { Worker } from '../api/types';

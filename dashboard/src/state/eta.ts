@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // When will it be done? From how fast cameras were committed lately; later cameras are faster, as more is accepted
 // before them, so that this errs to the careful side.
 

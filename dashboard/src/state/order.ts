@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import type { Attempt } from '../api/types';
 
 // Cameras are committed in one order: the earliest of those in flight is the one that everything waits for.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Everything the page knows about one reconstruction. Events say what is new; what is large is asked for again when an
 // event has made it old and somebody looks at it.
 import { batch, signal } from '@preact/signals';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs a fetch again when somebody says that its answer is old: never twice at once, and not more often than is decent,
 // which is longer for answers that take long.
 export class Refresher {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 type Waiter = { resolve: (digest: string) => void; reject: (error: Error) => void };
 
 // SHA-256 as 64 hexadecimal digits, computed beside the page's own thread.

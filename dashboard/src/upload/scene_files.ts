@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What was dropped or chosen, as the files of a scene.
 import type { FileToSend } from './uploader';
 

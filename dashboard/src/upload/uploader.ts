@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Brings the files of a scene to the coordinator, in parts. Whatever breaks (the network, the coordinator, the page
 // itself), beginning again goes on where the coordinator says it is.
 import { ApiError } from '../api/client';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // All cameras as pyramids in one draw call, coloured by state.
 import { BufferAttribute, BufferGeometry, Color, LineBasicMaterial, LineSegments, Vector3, type Camera } from 'three';
 import { CAMERA_STATES, type CameraState } from '../api/types';

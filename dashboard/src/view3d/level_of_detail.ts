@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How many faces of each part are shown. A mesh may have 50 million; the screen, and the browser, take a budget.
 
 export interface PartDemand {

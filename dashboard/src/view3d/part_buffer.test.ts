@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import { Color } from 'three';
 import { describe, expect, it } from 'vitest';
 import { PartBuffer } from './part_buffer';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // All parts that are shown as one draw call: each is a range of one vertex and one index buffer. A part that goes leaves
 // triangles without area behind, until the buffers are full and what is left moves together.
 import {

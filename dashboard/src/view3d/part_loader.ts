@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Decides what level of detail of which part is fetched next, and keeps few requests under way.
 import type { DataService } from '../api/data_service';
 import { ApiError } from '../api/client';

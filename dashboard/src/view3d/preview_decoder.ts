@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The preview of a part (coordinator/rest/openapi.yaml, previewPart) as buffers for the graphics card.
 
 export interface PartGeometry {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The mesh and its cameras on a canvas. Draws only when something has changed.
 import {
   AmbientLight,

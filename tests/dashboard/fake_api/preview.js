@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A part's preview in the layout of openapi.yaml: the cell of terrain below one camera, every stride-th row and column.
 import { color, height } from './terrain.js';
 

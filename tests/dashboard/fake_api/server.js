@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The coordinator's REST API (coordinator/rest/openapi.yaml) over simulated reconstructions, and the page beside it.
 //   node server.js [--port 7421] [--cameras 5000] [--faces 4000] [--committed 3000] [--rate 20] [--page DIST]
 import { createHash } from 'node:crypto';

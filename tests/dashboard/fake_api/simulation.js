@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A reconstruction that goes on by itself: cameras over a terrain are assigned to workers, fail now and then, and are
 // committed in order.
 import { createHash } from 'node:crypto';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The surface that the simulated cameras see: hills with a town on them, as a height over (x, y).
 
 function hash(x, y) {

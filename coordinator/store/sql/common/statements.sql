@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: Apache-2.0
 -- The statements of the store, for SQLite and PostgreSQL. What stands in "/*postgres: ... */" is a comment for SQLite,
 -- where only one process writes at a time and nothing needs a lock of its own.
 --

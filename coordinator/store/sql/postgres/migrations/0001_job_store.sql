@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: Apache-2.0
 -- Times are microseconds since 1970 (UTC), given by the caller. The same tables and invariants as in SQLite.
 
 CREATE TABLE reconstructions (

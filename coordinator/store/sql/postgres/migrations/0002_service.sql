@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: Apache-2.0
 -- What several coordinators share: how a reconstruction was asked for and how far it is, whole job specifications, the
 -- history of attempts, scenes' files, and which blobs belong to whom.
 

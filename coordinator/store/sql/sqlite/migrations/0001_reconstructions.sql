@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: Apache-2.0
 -- Times are microseconds since 1970 (UTC), given by the caller.
 
 CREATE TABLE reconstructions (

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: Apache-2.0
 -- Several coordinators and workers: more states of a reconstruction, leases with failed attempts, conductors, workers.
 
 -- SQLite cannot change a CHECK of a table that is there, so the table is made anew. (Foreign keys are not checked
