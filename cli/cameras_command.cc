@@ -46,7 +46,7 @@ void AddCamerasCommand(CLI::App& program, Run& run) {
   command.add_option("PHOTOGRAPHS", settings.photographs, "folder of JPEG, PNG, PGM or PPM")->required();
   command.add_option("-o,--output", settings.scene_folder, "the scene to make, a folder")->required();
   command.add_option("--pairs", arguments->pairs, "which photographs are compared; auto: by their number and names")
-      ->check(CLI::IsMember({"auto", "exhaustive", "sequential", "vocabulary-tree"}))
+      ->check(CLI::IsMember({"auto", "exhaustive", "sequential", "similar"}))
       ->capture_default_str();
   command
       .add_option("--max-features", settings.max_features,

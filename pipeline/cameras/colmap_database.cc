@@ -1,9 +1,14 @@
 #include "pipeline/cameras/colmap_database.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
 #include <sqlite3.h>
+
+#include "pipeline/cameras/nearest_descriptors.h"
 
 #include "common/base/status_macros.h"
 
@@ -31,11 +36,16 @@ class Statement {
   void Bind(int at, const std::string& text) {
     sqlite3_bind_text(statement_, at, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
   }
-  void BindBlob(int at, const std::string& bytes) {
-    sqlite3_bind_blob(statement_, at, bytes.data(), static_cast<int>(bytes.size()), SQLITE_TRANSIENT);
+  // `bytes` lives until the statement ends.
+  void BindBlob(int at, const void* bytes, size_t size) {
+    sqlite3_bind_blob(statement_, at, bytes, static_cast<int>(size), SQLITE_STATIC);
   }
   int Step() { return sqlite3_step(statement_); }
   int64_t Integer(int column) { return sqlite3_column_int64(statement_, column); }
+  std::string Blob(int column) {
+    const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_, column));
+    return bytes == nullptr ? "" : std::string(bytes, static_cast<size_t>(sqlite3_column_bytes(statement_, column)));
+  }
   std::string Text(int column) {
     const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
     return text == nullptr ? "" : text;
@@ -100,7 +110,8 @@ absl::Status ColmapDatabase::PutCamera(int64_t id, const CameraGroup& group) {
   statement.Bind(2, group.wide_model ? kOpenCv : kSimpleRadial);
   statement.Bind(3, int64_t{group.size.width});
   statement.Bind(4, int64_t{group.size.height});
-  statement.BindBlob(5, Parameters(group));
+  const std::string parameters = Parameters(group);
+  statement.BindBlob(5, parameters.data(), parameters.size());
   statement.Bind(6, int64_t{group.focal_from_exif ? 1 : 0});
   return statement.Step() == SQLITE_DONE ? absl::OkStatus() : Error();
 }
@@ -129,11 +140,79 @@ absl::Status ColmapDatabase::Fill(const std::vector<CameraGroup>& groups, const 
 
 absl::Status ColmapDatabase::PutPhotographs(const std::vector<CameraGroup>& groups,
                                             const std::vector<std::string>& names) {
+  return InTransaction([&] { return Fill(groups, names); });
+}
+
+absl::Status ColmapDatabase::InTransaction(const std::function<absl::Status()>& change) {
   MW_RETURN_IF_ERROR(Execute("BEGIN IMMEDIATE"));
-  absl::Status filled = Fill(groups, names);
-  if (filled.ok()) return Execute("COMMIT");
+  absl::Status changed = change();
+  if (changed.ok()) return Execute("COMMIT");
   static_cast<void>(Execute("ROLLBACK"));
-  return filled;
+  return changed;
+}
+
+absl::StatusOr<ColmapDatabase::Array> ColmapDatabase::ReadArray(const std::string& table, int64_t image,
+                                                                size_t value_bytes) {
+  Statement statement(connection_, absl::StrCat("SELECT rows, cols, data FROM ", table, " WHERE image_id = ?"));
+  if (!statement.valid()) return Error();
+  statement.Bind(1, image);
+  const int result = statement.Step();
+  if (result == SQLITE_DONE) return Array();
+  if (result != SQLITE_ROW) return Error();
+  Array array = {statement.Integer(0), statement.Integer(1), statement.Blob(2)};
+  const auto expected = static_cast<uint64_t>(array.rows) * static_cast<uint64_t>(array.columns) * value_bytes;
+  if (array.rows < 0 || array.columns < 0 || array.bytes.size() != expected) {
+    return absl::InternalError(absl::StrCat(path_, ": ", table, " of image ", image, " have ", array.bytes.size(),
+                                            " bytes, expected ", array.rows, " times ", array.columns, " numbers of ",
+                                            value_bytes, " bytes"));
+  }
+  return array;
+}
+
+absl::StatusOr<std::string> ColmapDatabase::Descriptors(int64_t image) {
+  MW_ASSIGN_OR_RETURN(Array array, ReadArray("descriptors", image, 1));
+  if (array.rows > 0 && array.columns != static_cast<int64_t>(kDescriptorBytes)) {
+    return absl::InternalError(absl::StrCat(path_, ": descriptors of image ", image, " have ", array.columns,
+                                            " bytes each, expected ", kDescriptorBytes));
+  }
+  return std::move(array.bytes);
+}
+
+// A feature is x, y, and the matrix that a unit square becomes, or x, y, scale and orientation.
+absl::StatusOr<std::vector<float>> ColmapDatabase::FeatureScales(int64_t image) {
+  MW_ASSIGN_OR_RETURN(const Array array, ReadArray("keypoints", image, sizeof(float)));
+  std::vector<float> scales;
+  const auto columns = static_cast<size_t>(array.columns);
+  for (size_t i = 0; i < static_cast<size_t>(array.rows); ++i) {
+    float values[6] = {};
+    std::memcpy(values, &array.bytes[i * columns * sizeof(float)], std::min<size_t>(columns, 6) * sizeof(float));
+    scales.push_back(columns < 6 ? values[2] : std::hypot(values[2], values[4]));
+  }
+  return scales;
+}
+
+absl::StatusOr<std::set<ImagePair>> ColmapDatabase::MatchedPairs() {
+  MW_ASSIGN_OR_RETURN(const std::vector<int64_t> ids, Integers("SELECT pair_id FROM matches"));
+  std::set<ImagePair> pairs;
+  for (const int64_t id : ids) pairs.insert({id / kPairFactor, id % kPairFactor});
+  return pairs;
+}
+
+absl::Status ColmapDatabase::PutMatchesOfPair(const PairMatches& pair) {
+  Statement statement(connection_, "INSERT OR REPLACE INTO matches(pair_id, rows, cols, data) VALUES(?, ?, 2, ?)");
+  if (!statement.valid()) return Error();
+  statement.Bind(1, pair.pair.first * kPairFactor + pair.pair.second);
+  statement.Bind(2, static_cast<int64_t>(pair.matches.size()));
+  statement.BindBlob(3, pair.matches.empty() ? "" : static_cast<const void*>(pair.matches.data()),
+                     pair.matches.size() * sizeof(FeatureMatch));
+  return statement.Step() == SQLITE_DONE ? absl::OkStatus() : Error();
+}
+
+absl::Status ColmapDatabase::PutMatches(const std::vector<PairMatches>& pairs) {
+  return InTransaction([&] {
+    for (const PairMatches& pair : pairs) MW_RETURN_IF_ERROR(PutMatchesOfPair(pair));
+    return absl::OkStatus();
+  });
 }
 
 absl::StatusOr<std::vector<int64_t>> ColmapDatabase::CountFeatures() {

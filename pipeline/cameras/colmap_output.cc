@@ -14,6 +14,8 @@ std::string NameOf(CameraStep step) {
       return "checking photographs";
     case CameraStep::kFeatures:
       return "finding features";
+    case CameraStep::kPairing:
+      return "choosing pairs";
     case CameraStep::kMatching:
       return "matching photographs";
     case CameraStep::kVerifying:
@@ -24,21 +26,17 @@ std::string NameOf(CameraStep step) {
   return "";
 }
 
-// "Processed file [3/25]", "Matching image [3/25]", "Matching block [2/5, 3/5]": the second dimension is the faster
-// one.
+// "Processed file [3/25]", "Matching block [2/5]".
 bool ColmapOutput::ReadCount(const std::string& line, const char* before) {
   const size_t at = line.find(before);
   if (at == std::string::npos) return false;
-  int row = 0;
-  int rows = 0;
-  int column = 1;
-  int columns = 1;
+  int done = 0;
+  int total = 0;
   const std::string counts = line.substr(at + std::string(before).size());
-  const int read = std::sscanf(counts.c_str(), "%d/%d, %d/%d", &row, &rows, &column, &columns);
-  if (read < 2 || row < 1 || rows < row || rows > 10'000'000) return false;
-  if (read < 4 || column < 1 || columns < column || columns > 100'000 || rows > 20'000) column = columns = 1;
-  total_ = rows * columns;
-  done_ = (row - 1) * columns + column;
+  const int read = std::sscanf(counts.c_str(), "%d/%d", &done, &total);
+  if (read < 2 || done < 1 || total < done || total > 10'000'000) return false;
+  total_ = total;
+  done_ = done;
   return true;
 }
 
@@ -46,11 +44,11 @@ bool ColmapOutput::Read(const std::string& line) {
   if (absl::StrContains(line, "ERROR") || absl::StrContains(line, "Check failed")) trouble_ = line;
   switch (step_) {
     case CameraStep::kChecking:
+    case CameraStep::kPairing:
+    case CameraStep::kMatching:
       return false;
     case CameraStep::kFeatures:
       return ReadCount(line, "Processed file [");
-    case CameraStep::kMatching:
-      return ReadCount(line, "Matching image [") || ReadCount(line, "Matching block [");
     case CameraStep::kVerifying:
       return ReadCount(line, "Matching block [");
     case CameraStep::kMapping: {

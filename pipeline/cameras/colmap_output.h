@@ -5,8 +5,8 @@
 namespace meshwright {
 
 // The steps of estimating cameras.
-enum class CameraStep { kChecking, kFeatures, kMatching, kVerifying, kMapping };
-constexpr int kCameraSteps = 5;
+enum class CameraStep { kChecking, kFeatures, kPairing, kMatching, kVerifying, kMapping };
+constexpr int kCameraSteps = 6;
 std::string NameOf(CameraStep step);
 
 // Reads how far COLMAP is out of what it prints (the texts of 3.8; later versions print the same behind a prefix).

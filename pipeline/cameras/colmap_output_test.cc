@@ -12,12 +12,9 @@ TEST(ColmapOutput, CountsAreThoseOfTheStep) {
   EXPECT_EQ(features.total(), 25);
   EXPECT_FALSE(features.Read("  Features:        3079"));
 
-  ColmapOutput matching(CameraStep::kMatching, 25);
-  EXPECT_TRUE(matching.Read("Matching block [2/5, 3/5] in 1.2s"));
-  EXPECT_EQ(matching.done(), 8);
-  EXPECT_EQ(matching.total(), 25);
-  EXPECT_TRUE(matching.Read("I0910 16:59:24 1 feature_matching.cc:9] Matching image [9/25] in 0.1s"));
-  EXPECT_EQ(matching.done(), 9);
+  ColmapOutput verifying(CameraStep::kVerifying, 25);
+  EXPECT_TRUE(verifying.Read("I0910 16:59:24 1 feature_matching.cc:9] Matching block [9/25] in 0.1s"));
+  EXPECT_EQ(verifying.done(), 9);
 }
 
 TEST(ColmapOutput, ASecondModelDoesNotSetTheBarBack) {
@@ -32,8 +29,7 @@ TEST(ColmapOutput, ASecondModelDoesNotSetTheBarBack) {
 TEST(ColmapOutput, NonsenseCountsNothing) {
   for (const char* line : {"Processed file [0/25]", "Processed file [7/3]", "Processed file [-1/25]",
                            "Processed file [", "Processed file [99999999999999999999/1]", "Registering image #", ""}) {
-    for (const auto step :
-         {CameraStep::kFeatures, CameraStep::kMatching, CameraStep::kVerifying, CameraStep::kMapping}) {
+    for (const auto step : {CameraStep::kFeatures, CameraStep::kVerifying, CameraStep::kMapping}) {
       ColmapOutput output(step, 25);
       EXPECT_FALSE(output.Read(line)) << line;
       EXPECT_EQ(output.done(), 0);

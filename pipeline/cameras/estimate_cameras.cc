@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 #include <memory>
-#include <numeric>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -22,6 +22,7 @@
 #include "pipeline/cameras/camera_groups.h"
 #include "pipeline/cameras/child_process.h"
 #include "pipeline/cameras/colmap_database.h"
+#include "pipeline/cameras/feature_matching.h"
 #include "pipeline/cameras/photograph_folder.h"
 
 #include "common/base/bad_input.h"
@@ -44,7 +45,7 @@ constexpr int64_t kLongestLogBytes = 64 << 20;
 constexpr double kWellRegistered = 0.7;  // of the photographs
 
 // Shares of the time, for one bar.
-constexpr double kShareBefore[kCameraSteps + 1] = {0, 0.02, 0.12, 0.6, 0.7, 1};
+constexpr double kShareBefore[kCameraSteps + 1] = {0, 0.02, 0.4, 0.41, 0.5, 0.6, 1};
 
 absl::Status SystemError(const fs::path& path, const char* what, const std::error_code& error) {
   const std::string message = absl::StrCat(path.string(), ": ", what, ": ", error.message());
@@ -119,7 +120,6 @@ class Estimation {
  private:
   std::string Database() const { return (work_ / "database.db").string(); }
   std::string LogPath() const { return (work_ / "log.txt").string(); }
-  std::string VocabularyTree() const { return (work_ / "vocabulary.bin").string(); }
   fs::path StatePath() const { return work_ / "state.json"; }
   fs::path Models() const { return work_ / "sparse"; }
   int Count() const { return static_cast<int>(photographs_.photographs.size()); }
@@ -205,7 +205,7 @@ class Estimation {
   }
 
   // Names without spaces, in natural order, under which COLMAP sees photographs and masks: its lists of pairs are split
-  // at spaces, and its sequential matcher sorts by bytes.
+  // at spaces.
   std::string PlainName(size_t photograph) const {
     return absl::StrFormat("%06d%s", photograph + 1,
                            fs::path(photographs_.photographs[photograph].name).extension().string());
@@ -296,60 +296,31 @@ class Estimation {
     return absl::OkStatus();
   }
 
-  std::vector<std::string> MatchingArguments() const {
-    // One trial: pairs are verified in the next step, where chance cannot enter by the order of threads.
-    return {"--database_path",
-            Database(),
-            "--SiftMatching.use_gpu",
-            "0",
-            "--SiftMatching.num_threads",
-            kThreads,
-            "--SiftMatching.max_num_trials",
-            "1"};
-  }
-
   absl::Status Match() {
     Say(absl::StrCat("photographs are compared ", chosen_.reason, " (", NameOf(chosen_.selection), ")"));
-    std::vector<std::string> arguments = MatchingArguments();
-    if (chosen_.selection != PairSelection::kExhaustive) MW_RETURN_IF_ERROR(BuildVocabularyTree());
-    switch (chosen_.selection) {
-      case PairSelection::kExhaustive:
-        arguments.insert(arguments.begin(), "exhaustive_matcher");
-        // Small enough for some hundred steps of progress, and for little to be lost when it is killed.
-        arguments.insert(arguments.end(),
-                         {"--ExhaustiveMatching.block_size", absl::StrCat(std::clamp(Count() / 10, 4, 50))});
-        break;
-      case PairSelection::kSequential:
-        arguments.insert(arguments.begin(), "sequential_matcher");
-        arguments.insert(arguments.end(), {"--SequentialMatching.overlap", "10", "--SequentialMatching.loop_detection",
-                                           "1", "--SequentialMatching.vocab_tree_path", VocabularyTree()});
-        break;
-      case PairSelection::kVocabularyTree:
-        arguments.insert(arguments.begin(), "vocab_tree_matcher");
-        arguments.insert(arguments.end(), {"--VocabTreeMatching.num_images", "50",
-                                           "--VocabTreeMatching.vocab_tree_path", VocabularyTree()});
-        break;
+    ThreadPool pool(settings_.threads);
+    MW_ASSIGN_OR_RETURN(const auto database, ColmapDatabase::Open(Database()));
+    std::vector<ImagePair> pairs = PairsByNumber(chosen_.selection, Count());
+    if (const size_t similar = SimilarPerPhotograph(chosen_.selection); similar > 0) {
+      MW_ASSIGN_OR_RETURN(const std::vector<ImagePair> alike,
+                          FindSimilarPairs(*database, Count(), similar, pool, MatchingListener(CameraStep::kPairing)));
+      std::vector<ImagePair> both;
+      std::ranges::set_union(pairs, alike, std::back_inserter(both));
+      pairs = std::move(both);
     }
-    MW_RETURN_IF_ERROR(RunColmap(CameraStep::kMatching, arguments));
+    MW_RETURN_IF_ERROR(MatchPairs(*database, pairs, pool, MatchingListener(CameraStep::kMatching)));
     return MarkDone("matches");
   }
 
-  // Nothing is downloaded: the words are clusters of these photographs' own features.
-  absl::Status BuildVocabularyTree() {
-    std::error_code error;
-    if (fs::exists(VocabularyTree(), error)) return absl::OkStatus();
-    MW_ASSIGN_OR_RETURN(const auto database, ColmapDatabase::Open(Database()));
-    MW_ASSIGN_OR_RETURN(const std::vector<int64_t> features, database->CountFeatures());
-    const int64_t all = std::accumulate(features.begin(), features.end(), int64_t{0});
-    const int64_t words =
-        std::min(std::clamp<int64_t>(int64_t{64} * Count(), 4096, 65536), std::max<int64_t>(256, all / 8));
-    const std::string partial = VocabularyTree() + ".partial";
-    MW_RETURN_IF_ERROR(RunColmap(CameraStep::kMatching,
-                                 {"vocab_tree_builder", "--database_path", Database(), "--vocab_tree_path", partial,
-                                  "--num_visual_words", absl::StrCat(words), "--max_num_images", "1000"}));
-    fs::rename(partial, VocabularyTree(), error);
-    if (error) return SystemError(partial, "cannot be renamed", error);
-    return absl::OkStatus();
+  MatchingProgress MatchingListener(CameraStep step) const {
+    return [this, step, started = clock_.Now(), before = int64_t{-1}](int64_t done, int64_t total) mutable {
+      if (before < 0) before = done;
+      const double seconds = absl::ToDoubleSeconds(clock_.Now() - started);
+      const double left =
+          done > before ? seconds / static_cast<double>(done - before) * static_cast<double>(total - done) : -1;
+      Tell(step, static_cast<int>(done), static_cast<int>(total), left);
+      return !Stopped();
+    };
   }
 
   absl::Status Verify() {
@@ -436,7 +407,7 @@ class Estimation {
     if (!fs::equivalent(images, settings_.photographs, error))
       MW_RETURN_IF_ERROR(LinkTo(settings_.photographs, images));
     MW_RETURN_IF_ERROR(MarkDone("scene"));
-    for (const char* name : {"database.db", "pairs.txt", "vocabulary.bin", "photographs", "masks"}) {
+    for (const char* name : {"database.db", "pairs.txt", "photographs", "masks"}) {
       fs::remove_all(work_ / name, error);  // large, and of no more use
     }
     return absl::OkStatus();

@@ -31,7 +31,7 @@ struct CameraEstimationSettings {
 
 struct CameraProgress {
   CameraStep step = CameraStep::kChecking;
-  int done = 0;              // photographs, or blocks of pairs
+  int done = 0;              // photographs, pairs, or blocks of pairs
   int total = 0;             // 0: not known yet
   double fraction = 0;       // of everything, in [0, 1], by usual shares of the steps
   double seconds_left = -1;  // of this step, from its own speed; < 0: not known yet
@@ -49,8 +49,8 @@ struct CameraEstimate {
 // older than 3.6.
 absl::StatusOr<std::string> FindColmap(const std::string& program);
 
-// The result is a function of photographs, masks and settings: numbers are given by us, RANSAC and bundle adjustment
-// run on one thread from one seed, only features and matches, which need no chance, are found on many. Errors: BadInput
+// The result is a function of photographs, masks and settings: numbers are given by us, features are compared by us and
+// exactly, RANSAC and bundle adjustment run on one thread from one seed. Errors: BadInput
 // (too few photographs, none that decodes), FailedPrecondition (COLMAP is missing; the photographs give no cameras, and
 // what to photograph better; the folder holds others'), Cancelled (stop), Internal (COLMAP broke down, with its own
 // last words).

@@ -96,8 +96,7 @@ TEST_F(EstimateCamerasTest, PhotographsBecomeAScene) {
   EXPECT_EQ(estimate->photographs, 4);
   EXPECT_EQ(estimate->registered, 3);
   EXPECT_THAT(estimate->notes, ElementsAre(HasSubstr("b.jpg")));
-  EXPECT_THAT(Calls(),
-              ElementsAre("database_creator", "feature_extractor", "exhaustive_matcher", "matches_importer", "mapper"));
+  EXPECT_THAT(Calls(), ElementsAre("database_creator", "feature_extractor", "matches_importer", "mapper"));
   const auto scene = ImportScene(folder_ / "scene");
   ASSERT_TRUE(scene.ok()) << scene.status();
   EXPECT_EQ(scene->views.size(), 3U);
@@ -115,7 +114,7 @@ TEST_F(EstimateCamerasTest, ProgressNeverFallsAndReachesItsEnd) {
 }
 
 TEST_F(EstimateCamerasTest, WhatAStepHasDoneIsKept) {
-  const std::vector<std::string> steps = {"feature_extractor", "exhaustive_matcher", "matches_importer", "mapper"};
+  const std::vector<std::string> steps = {"feature_extractor", "matches_importer", "mapper"};
   for (size_t i = 0; i < steps.size(); ++i) {
     settings_.scene_folder = folder_ / absl::StrCat("scene", i);
     Mode(steps[i] + " abort\n");
@@ -135,7 +134,7 @@ TEST_F(EstimateCamerasTest, FailuresSayWhatToPhotographBetter) {
     const char* mode;
     const char* says;
   } kCases[] = {{"feature_extractor none", "next to no features"},
-                {"exhaustive_matcher none", "no two of the 4 photographs show the same surface"},
+                {"feature_extractor alone", "no two of the 4 photographs show the same surface"},
                 {"matches_importer none", "no two of the 4 photographs show the same surface"},
                 {"mapper no_initial_pair", "far enough apart"}};
   for (const auto& failure : kCases) {
@@ -176,16 +175,6 @@ TEST_F(EstimateCamerasTest, KilledForMemoryItGoesOnWithFewerThreads) {
   ASSERT_TRUE(Estimate().ok());
   const std::vector<std::string> calls = Calls();
   EXPECT_EQ(std::count(calls.begin(), calls.end(), "feature_extractor"), 3);  // with 4, 2, 1
-}
-
-TEST_F(EstimateCamerasTest, AVocabularyIsMadeOnceAndOfOwnFeatures) {
-  settings_.pairs = PairSelection::kVocabularyTree;
-  Mode("vocab_tree_matcher abort\n");
-  ASSERT_FALSE(Estimate().ok());
-  Calls();
-  Mode("");
-  ASSERT_TRUE(Estimate().ok());
-  EXPECT_THAT(Calls(), ElementsAre("vocab_tree_matcher", "matches_importer", "mapper"));
 }
 
 TEST_F(EstimateCamerasTest, FloodsOfOutputAreNotKept) {

@@ -15,12 +15,16 @@ constexpr size_t kMostForEachWithEach = 200;
 // Videos are taken apart with a stride, and people delete blurred frames.
 constexpr int64_t kLargestGapPerFrame = 60;
 
+constexpr int64_t kFollowing = 10;
+constexpr size_t kSimilarFrames = 20;  // of a video, for places that it comes back to
+constexpr size_t kSimilarPhotographs = 50;
+
 constexpr struct {
   PairSelection selection;
   const char* name;
 } kNames[] = {{PairSelection::kExhaustive, "exhaustive"},
               {PairSelection::kSequential, "sequential"},
-              {PairSelection::kVocabularyTree, "vocabulary-tree"}};
+              {PairSelection::kSimilar, "similar"}};
 
 struct NumberedName {
   std::string prefix;
@@ -73,8 +77,31 @@ ChosenPairs ChoosePairs(const std::vector<Photograph>& photographs) {
   if (AreVideoFrames(photographs)) {
     return {PairSelection::kSequential, "each with those that follow and those that look alike: frames of a video"};
   }
-  return {PairSelection::kVocabularyTree,
+  return {PairSelection::kSimilar,
           absl::StrCat("each with those that look alike, as each with each of ", count, " would take too long")};
+}
+
+std::vector<ImagePair> PairsByNumber(PairSelection selection, int64_t images) {
+  int64_t following = 0;
+  if (selection == PairSelection::kExhaustive) following = images;
+  if (selection == PairSelection::kSequential) following = kFollowing;
+  std::vector<ImagePair> pairs;
+  for (int64_t i = 1; i <= images; ++i) {
+    for (int64_t j = i + 1; j <= std::min(images, i + following); ++j) pairs.emplace_back(i, j);
+  }
+  return pairs;
+}
+
+size_t SimilarPerPhotograph(PairSelection selection) {
+  switch (selection) {
+    case PairSelection::kExhaustive:
+      return 0;
+    case PairSelection::kSequential:
+      return kSimilarFrames;
+    case PairSelection::kSimilar:
+      return kSimilarPhotographs;
+  }
+  return 0;
 }
 
 }  // namespace meshwright

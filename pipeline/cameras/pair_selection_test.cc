@@ -27,14 +27,19 @@ TEST(PairSelection, FramesOfAVideoAreComparedWithThoseThatFollow) {
 }
 
 TEST(PairSelection, NumberedPhotographsOfACameraAreNoVideo) {
-  EXPECT_EQ(ChoosePairs(Named("IMG_%04d.jpg", 201, 1, "Maker")).selection, PairSelection::kVocabularyTree);
-  EXPECT_EQ(ChoosePairs(Named("%d-photo.jpg", 201, 1)).selection, PairSelection::kVocabularyTree);
-  EXPECT_EQ(ChoosePairs(Named("frame-%09d.jpg", 201, 1000)).selection, PairSelection::kVocabularyTree);
+  EXPECT_EQ(ChoosePairs(Named("IMG_%04d.jpg", 201, 1, "Maker")).selection, PairSelection::kSimilar);
+  EXPECT_EQ(ChoosePairs(Named("%d-photo.jpg", 201, 1)).selection, PairSelection::kSimilar);
+  EXPECT_EQ(ChoosePairs(Named("frame-%09d.jpg", 201, 1000)).selection, PairSelection::kSimilar);
+}
+
+TEST(PairSelection, PairsByNumber) {
+  EXPECT_EQ(PairsByNumber(PairSelection::kExhaustive, 3), std::vector<ImagePair>({{1, 2}, {1, 3}, {2, 3}}));
+  EXPECT_EQ(PairsByNumber(PairSelection::kSequential, 30).size(), 20U * 10 + 45);
+  EXPECT_TRUE(PairsByNumber(PairSelection::kSimilar, 30).empty());
 }
 
 TEST(PairSelection, NamesComeBack) {
-  for (const auto selection :
-       {PairSelection::kExhaustive, PairSelection::kSequential, PairSelection::kVocabularyTree}) {
+  for (const auto selection : {PairSelection::kExhaustive, PairSelection::kSequential, PairSelection::kSimilar}) {
     EXPECT_EQ(PairSelectionOfName(NameOf(selection)), selection);
   }
   EXPECT_EQ(PairSelectionOfName("auto"), std::nullopt);
