@@ -19,6 +19,17 @@ Sha256Stream::Sha256Stream() : state_(std::make_unique<State>()) {
   MW_CHECK(EVP_DigestInit_ex(state_->context, EVP_sha256(), nullptr) == 1);
 }
 
+Sha256Stream::Sha256Stream(const Sha256Stream& other) : state_(std::make_unique<State>()) {
+  MW_CHECK(EVP_MD_CTX_copy_ex(state_->context, other.state_->context) == 1);
+}
+
+Sha256Stream::Sha256Stream(Sha256Stream&& other) noexcept = default;
+
+Sha256Stream& Sha256Stream::operator=(Sha256Stream other) noexcept {
+  state_.swap(other.state_);
+  return *this;
+}
+
 Sha256Stream::~Sha256Stream() = default;
 
 void Sha256Stream::Update(absl::Span<const uint8_t> bytes) {

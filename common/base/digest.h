@@ -13,10 +13,13 @@ namespace meshwright {
 std::string Sha256Hex(absl::Span<const uint8_t> bytes);
 std::string Sha256Hex(const std::string& bytes);
 
-// The same over data that comes in pieces.
+// The same over data that comes in pieces. A copy goes on by itself: its digest can be had while this one takes more.
 class Sha256Stream {
  public:
   Sha256Stream();
+  Sha256Stream(const Sha256Stream& other);
+  Sha256Stream(Sha256Stream&& other) noexcept;
+  Sha256Stream& operator=(Sha256Stream other) noexcept;
   ~Sha256Stream();
   void Update(absl::Span<const uint8_t> bytes);
   // Ends the stream. Call once.

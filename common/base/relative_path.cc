@@ -13,7 +13,11 @@ constexpr size_t kMaxPathLength = 1024;
 }  // namespace
 
 absl::Status ValidateRelativePath(const std::string& path) {
-  bool valid = !path.empty() && path.size() <= kMaxPathLength && path.find('\0') == std::string::npos;
+  if (path.size() > kMaxPathLength) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("path has ", path.size(), " characters, expected at most ", kMaxPathLength));
+  }
+  bool valid = !path.empty() && path.find('\0') == std::string::npos;
   for (const std::string& part : std::vector<std::string>(absl::StrSplit(path, '/'))) {
     valid = valid && !part.empty() && part != "." && part != "..";
   }

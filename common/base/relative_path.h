@@ -6,7 +6,8 @@
 
 namespace meshwright {
 
-// InvalidArgument (naming the field `path`) unless it is a relative path that stays inside: no "..", no empty part.
+// InvalidArgument (naming the field `path`) unless it is a relative path that stays inside: no "..", no empty part, at
+// most 1024 characters.
 absl::Status ValidateRelativePath(const std::string& path);
 
 }  // namespace meshwright

@@ -22,14 +22,19 @@ class BlobStore {
   // Get into a file that appears whole or not at all.
   virtual absl::StatusOr<std::string> PutFile(const std::string& path);
   virtual absl::Status GetFile(const std::string& digest, const std::string& path);
+  // Takes over a file that was hashed and synced while it was written (StagedBlob): once it returns OK the blob is
+  // durable and the file is gone. Bytes of another digest would be a damaged blob. A file in staging_folder() is moved,
+  // not copied; the folder need not be there yet. "": the store has none, any folder will do.
+  virtual absl::Status Adopt(const std::string& path, const std::string& digest);
+  virtual std::string staging_folder() const { return ""; }
   virtual absl::StatusOr<bool> Has(const std::string& digest) = 0;
   // Deleting what is not there is harmless.
   virtual absl::Status Delete(const std::string& digest) = 0;
 };
 
-// InvalidArgument unless `digest` is one that Put could have returned. Get, Has and Delete check it, so that digests
-// from outside cannot name anything but blobs.
-absl::Status ValidateDigest(const std::string& digest);
+// InvalidArgument, calling it `name`, unless `digest` is one that Put could have returned. Get, Has and Delete check
+// it, so that digests from outside cannot name anything but blobs.
+absl::Status ValidateDigest(const std::string& digest, const std::string& name = "blob digest");
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -15,6 +15,7 @@
 #include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/blob/blob_store.h"
+#include "common/blob/staged_blob.h"
 
 namespace meshwright {
 
@@ -100,6 +101,24 @@ TEST_P(BlobStoreConformanceTest, FilesAreBlobsToo) {
   EXPECT_EQ(store().GetFile(*digest, path).code(), absl::StatusCode::kDataLoss);
   EXPECT_EQ(ReadFile(path).status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(store().GetFile(Sha256Hex(std::string("nothing")), path).code(), absl::StatusCode::kNotFound);
+}
+
+TEST_P(BlobStoreConformanceTest, FilesAreAdopted) {
+  for (const size_t size : {0, 3'000'000}) {
+    const std::string bytes = RandomBytes(11, size);
+    const std::string staging = store().staging_folder();
+    const auto path = StagedBlob::NewPath(staging.empty() ? testing::TempDir() : staging);
+    ASSERT_TRUE(path.ok()) << path.status();
+    const auto staged = StagedBlob::Open(*path);
+    ASSERT_TRUE(staged.ok()) << staged.status();
+    ASSERT_TRUE(
+        (*staged)->Append(absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size())).ok());
+    ASSERT_TRUE((*staged)->Sync().ok());
+    const absl::Status adopted = (*staged)->Adopt(store());
+    ASSERT_TRUE(adopted.ok()) << adopted;
+    EXPECT_TRUE(*store().Get(Sha256Hex(bytes)) == bytes);
+    EXPECT_EQ(ReadFile(*path).status().code(), absl::StatusCode::kNotFound);
+  }
 }
 
 TEST_P(BlobStoreConformanceTest, DeletedBlobsAreGoneAndOthersStay) {

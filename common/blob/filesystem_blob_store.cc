@@ -125,6 +125,20 @@ absl::Status FilesystemBlobStore::GetFile(const std::string& digest, const std::
   return file.Commit();
 }
 
+absl::Status FilesystemBlobStore::Adopt(const std::string& path, const std::string& digest) {
+  MW_RETURN_IF_ERROR(ValidateDigest(digest));
+  const std::string target = PathOf(digest);
+  MW_RETURN_IF_ERROR(MakeFolderOf(target));
+  std::error_code error;
+  fs::rename(path, target, error);
+  if (error == std::errc::cross_device_link) return BlobStore::Adopt(path, digest);
+  if (error) return SystemError("cannot move the blob into place", target, error);
+  SyncFolder(fs::path(target).parent_path().string());
+  return absl::OkStatus();
+}
+
+std::string FilesystemBlobStore::staging_folder() const { return absl::StrCat(root_, "/staging"); }
+
 absl::StatusOr<bool> FilesystemBlobStore::Has(const std::string& digest) {
   MW_RETURN_IF_ERROR(ValidateDigest(digest));
   const std::string path = PathOf(digest);

@@ -10,9 +10,9 @@
 
 namespace meshwright {
 
-// Blobs as files below one folder: ROOT/ab/abcdef... (the first two digits of the digest, then all of it). Files appear
-// whole or not at all, so several processes, also on several machines, may share the folder. Errors name the path;
-// ResourceExhausted when the disk is full.
+// Blobs as files below one folder: ROOT/ab/abcdef... (the first two digits of the digest, then all of it). What is on
+// its way lies in ROOT/staging. Files appear whole or not at all, so several processes, also on several machines, may
+// share the folder. Errors name the path; ResourceExhausted when the disk is full.
 class FilesystemBlobStore : public BlobStore {
  public:
   // Creates the folder (and those above it) when it is not there.
@@ -22,6 +22,8 @@ class FilesystemBlobStore : public BlobStore {
   absl::StatusOr<std::string> Get(const std::string& digest) override;
   absl::StatusOr<std::string> PutFile(const std::string& path) override;
   absl::Status GetFile(const std::string& digest, const std::string& path) override;
+  absl::Status Adopt(const std::string& path, const std::string& digest) override;
+  std::string staging_folder() const override;
   absl::StatusOr<bool> Has(const std::string& digest) override;
   absl::Status Delete(const std::string& digest) override;
 

@@ -20,6 +20,8 @@ class LostBlobNamer : public BlobStore {
   absl::StatusOr<std::string> Get(const std::string& digest) override;
   absl::StatusOr<std::string> PutFile(const std::string& path) override { return blobs_.PutFile(path); }
   absl::Status GetFile(const std::string& digest, const std::string& path) override;
+  absl::Status Adopt(const std::string& path, const std::string& digest) override { return blobs_.Adopt(path, digest); }
+  std::string staging_folder() const override { return blobs_.staging_folder(); }
   absl::StatusOr<bool> Has(const std::string& digest) override { return blobs_.Has(digest); }
   absl::Status Delete(const std::string& digest) override { return blobs_.Delete(digest); }
 

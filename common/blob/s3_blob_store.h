@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
+
+#include <absl/types/span.h>
 
 #include "common/blob/blob_store.h"
 #include "common/blob/s3_client.h"
@@ -18,6 +21,8 @@ class S3BlobStore : public BlobStore {
 
   absl::StatusOr<std::string> Put(const std::string& bytes) override;
   absl::StatusOr<std::string> Get(const std::string& digest) override;
+  // Sends the file from where it lies: what fits into one request is neither held in memory nor hashed again.
+  absl::Status Adopt(const std::string& path, const std::string& digest) override;
   absl::StatusOr<bool> Has(const std::string& digest) override;
   absl::Status Delete(const std::string& digest) override;
 
@@ -26,9 +31,10 @@ class S3BlobStore : public BlobStore {
 
  private:
   explicit S3BlobStore(const S3Options& options) : client_(options) {}
-  absl::Status PutInParts(const std::string& key, const std::string& bytes);
+  absl::Status PutObject(const std::string& digest, absl::Span<const uint8_t> bytes);
+  absl::Status PutInParts(const std::string& key, absl::Span<const uint8_t> bytes);
   absl::StatusOr<std::string> UploadParts(const std::string& key, const std::string& upload_id,
-                                          const std::string& bytes);
+                                          absl::Span<const uint8_t> bytes);
 
   S3Client client_;
 };

@@ -1,8 +1,21 @@
 #include "common/telemetry/measured_blob_store.h"
 
+#include <filesystem>
+#include <system_error>
+
 #include <absl/time/clock.h>
 
 namespace meshwright {
+namespace {
+
+// 0 where there is no such file.
+double SizeOf(const std::string& path) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(path, error);
+  return error ? 0 : static_cast<double>(size);
+}
+
+}  // namespace
 
 MeasuredBlobStore::MeasuredBlobStore(BlobStore& blobs, Metrics& metrics)
     : blobs_(blobs),
@@ -24,6 +37,31 @@ absl::StatusOr<std::string> MeasuredBlobStore::Get(const std::string& digest) {
   calls_.Record("get", absl::Now() - begun, bytes.status());
   if (bytes.ok()) read_bytes_.Increment(static_cast<double>(bytes->size()));
   return bytes;
+}
+
+absl::StatusOr<std::string> MeasuredBlobStore::PutFile(const std::string& path) {
+  const absl::Time begun = absl::Now();
+  absl::StatusOr<std::string> digest = blobs_.PutFile(path);
+  calls_.Record("put", absl::Now() - begun, digest.status());
+  if (digest.ok()) written_bytes_.Increment(SizeOf(path));
+  return digest;
+}
+
+absl::Status MeasuredBlobStore::GetFile(const std::string& digest, const std::string& path) {
+  const absl::Time begun = absl::Now();
+  absl::Status status = blobs_.GetFile(digest, path);
+  calls_.Record("get", absl::Now() - begun, status);
+  if (status.ok()) read_bytes_.Increment(SizeOf(path));
+  return status;
+}
+
+absl::Status MeasuredBlobStore::Adopt(const std::string& path, const std::string& digest) {
+  const double bytes = SizeOf(path);
+  const absl::Time begun = absl::Now();
+  absl::Status status = blobs_.Adopt(path, digest);
+  calls_.Record("put", absl::Now() - begun, status);
+  if (status.ok()) written_bytes_.Increment(bytes);
+  return status;
 }
 
 absl::StatusOr<bool> MeasuredBlobStore::Has(const std::string& digest) {

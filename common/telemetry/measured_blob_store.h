@@ -18,6 +18,10 @@ class MeasuredBlobStore final : public BlobStore {
 
   absl::StatusOr<std::string> Put(const std::string& bytes) override;
   absl::StatusOr<std::string> Get(const std::string& digest) override;
+  absl::StatusOr<std::string> PutFile(const std::string& path) override;
+  absl::Status GetFile(const std::string& digest, const std::string& path) override;
+  absl::Status Adopt(const std::string& path, const std::string& digest) override;
+  std::string staging_folder() const override { return blobs_.staging_folder(); }
   absl::StatusOr<bool> Has(const std::string& digest) override;
   absl::Status Delete(const std::string& digest) override;
 

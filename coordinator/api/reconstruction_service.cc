@@ -244,25 +244,35 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Create(const v1::Creat
   return Describe(*stored);
 }
 
-absl::StatusOr<SceneFileUpload> ReconstructionService::BeginUpload(const v1::UploadSceneFileRequest::Header& header) {
-  MW_ASSIGN_OR_RETURN(const Reconstruction stored, Find(header.reconstruction_id()));
+absl::Status ReconstructionService::CheckTakesFiles(const std::string& id) const {
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, Find(id));
   if (stored.state != ReconstructionState::kCreated) return WrongState(stored, "one not started");
-  if (!stored.scene_reference.empty()) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("reconstruction ", stored.id, " has a scene_reference; nothing is uploaded to it"));
-  }
-  return SceneFileUpload::Begin(
-      absl::StrCat(options_.data_folder, "/uploads"), header.path(), header.size_bytes(), header.sha256(),
-      [this, header](const std::string& local_path) { return KeepUpload(header, local_path); });
+  if (stored.scene_reference.empty()) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrCat("reconstruction ", stored.id, " has a scene_reference; nothing is uploaded to it"));
 }
 
-absl::Status ReconstructionService::KeepUpload(const v1::UploadSceneFileRequest::Header& header,
-                                               const std::string& local_path) {
-  ReferencedBlobs blobs(header.reconstruction_id(), *environment_.store, *environment_.blobs);
-  MW_RETURN_IF_ERROR(blobs.PutFile(local_path, header.sha256()));
-  return environment_.store->PutSceneFile(
-      header.reconstruction_id(),
-      {.path = header.path(), .size_bytes = header.size_bytes(), .digest = header.sha256()});
+absl::StatusOr<SceneFileUpload> ReconstructionService::BeginUpload(const v1::UploadSceneFileRequest::Header& header) {
+  MW_RETURN_IF_ERROR(CheckTakesFiles(header.reconstruction_id()));
+  return SceneFileUpload::Begin(
+      staging_folder(), header.path(), header.size_bytes(), header.sha256(),
+      [this, header](const std::string& staged_path) {
+        return AdoptSceneFile(header.reconstruction_id(),
+                              {.path = header.path(), .size_bytes = header.size_bytes(), .digest = header.sha256()},
+                              staged_path);
+      });
+}
+
+absl::Status ReconstructionService::AdoptSceneFile(const std::string& id, const SceneFile& file,
+                                                   const std::string& staged_path) {
+  MW_RETURN_IF_ERROR(CheckTakesFiles(id));
+  MW_RETURN_IF_ERROR(ReferencedBlobs(id, *environment_.store, *environment_.blobs).Adopt(staged_path, file.digest));
+  return environment_.store->PutSceneFile(id, file);
+}
+
+std::string ReconstructionService::staging_folder() const {
+  const std::string folder = environment_.blobs->staging_folder();
+  return folder.empty() ? absl::StrCat(options_.data_folder, "/uploads") : folder;
 }
 
 absl::StatusOr<std::vector<SceneFile>> ReconstructionService::ListSceneFiles(const std::string& id) const {

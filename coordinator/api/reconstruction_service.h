@@ -44,6 +44,10 @@ class ReconstructionService {
 
   absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request);
   absl::StatusOr<SceneFileUpload> BeginUpload(const v1::UploadSceneFileRequest::Header& header);
+  // The same for a file that has come otherwise and lies, synced and with the digest that it should have, in
+  // staging_folder(), or elsewhere where it has to be copied. It is gone when this returns OK.
+  absl::Status AdoptSceneFile(const std::string& id, const SceneFile& file, const std::string& staged_path);
+  std::string staging_folder() const;
   // What has been uploaded so far, by path.
   absl::StatusOr<std::vector<SceneFile>> ListSceneFiles(const std::string& id) const;
   absl::StatusOr<v1::Reconstruction> Start(const std::string& id);
@@ -75,7 +79,7 @@ class ReconstructionService {
 
   absl::StatusOr<Reconstruction> Find(const std::string& id) const;
   v1::Reconstruction Describe(const Reconstruction& reconstruction) const;
-  absl::Status KeepUpload(const v1::UploadSceneFileRequest::Header& header, const std::string& local_path);
+  absl::Status CheckTakesFiles(const std::string& id) const;
   void StopConducting(const std::string& id);
   void Changed(bool look);
   void Oversee();

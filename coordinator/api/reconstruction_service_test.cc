@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/check.h"
+#include "common/base/files.h"
 #include "common/blob/filesystem_blob_store.h"
 #include "common/image/encode.h"
 #include "common/scene/formats/export_colmap.h"
@@ -302,7 +303,7 @@ TEST_F(ReconstructionServiceTest, AnUploadIsThereWholeOrNotAtAll) {
   EXPECT_TRUE(send("wall").ok());
   EXPECT_THAT(*service_->ListSceneFiles("up"), testing::ElementsAre(SceneFile{"a/b.txt", 4, header.sha256()}));
   EXPECT_EQ(*blobs_->Get(header.sha256()), "wall");
-  EXPECT_TRUE(fs::is_empty(folder_ + "/data/uploads"));
+  EXPECT_TRUE(fs::is_empty(service_->staging_folder()));
 }
 
 }  // namespace

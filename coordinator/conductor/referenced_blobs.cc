@@ -35,5 +35,10 @@ absl::Status ReferencedBlobs::PutFile(const std::string& path, const std::string
   return absl::OkStatus();
 }
 
+absl::Status ReferencedBlobs::Adopt(const std::string& path, const std::string& digest) {
+  MW_RETURN_IF_ERROR(Hold(digest));
+  return blobs_.Adopt(path, digest);
+}
+
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

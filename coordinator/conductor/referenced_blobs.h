@@ -21,6 +21,8 @@ class ReferencedBlobs {
   absl::StatusOr<std::string> Put(const std::string& bytes);
   // Of a file whose digest is known.
   absl::Status PutFile(const std::string& path, const std::string& digest);
+  // See BlobStore::Adopt.
+  absl::Status Adopt(const std::string& path, const std::string& digest);
 
  private:
   absl::Status Hold(const std::string& digest);

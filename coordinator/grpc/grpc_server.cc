@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <absl/cleanup/cleanup.h>
 #include <absl/strings/str_cat.h>
 #include <absl/time/clock.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
@@ -16,13 +17,14 @@
 
 #include "common/base/mutex.h"
 #include "common/base/status_macros.h"
+#include "common/blob/staged_blob.h"
 
 namespace meshwright {
 namespace {
 
 constexpr size_t kChunkBytes = size_t{256} << 10;
-// Blobs go through memory as a whole: nobody may fill it.
-constexpr size_t kMaxBlobBytes = size_t{2} << 30;
+// Of what a worker makes: nobody may fill the disk.
+constexpr int64_t kMaxBlobBytes = int64_t{2} << 30;
 
 grpc::Status ToGrpc(const absl::Status& status) {
   return {static_cast<grpc::StatusCode>(status.code()), std::string(status.message())};
@@ -191,7 +193,8 @@ class WaitingWorker final : public grpc::ServerUnaryReactor {
 
 class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Synchronize<v1::WorkerService::Service> {
  public:
-  WorkerServiceImpl(WorkerService& service, BlobStore& blobs) : service_(service), blobs_(blobs) {}
+  WorkerServiceImpl(WorkerService& service, BlobStore& blobs, std::string staging_folder)
+      : service_(service), blobs_(blobs), staging_folder_(std::move(staging_folder)) {}
 
   grpc::ServerUnaryReactor* Synchronize(grpc::CallbackServerContext*, const v1::SynchronizeRequest* request,
                                         v1::SynchronizeResponse* response) override {
@@ -215,21 +218,28 @@ class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Syn
     }
     const std::string expected = request.digest();
     MW_RETURN_IF_ERROR(ValidateDigest(expected));
-    std::string bytes;
+    MW_ASSIGN_OR_RETURN(const std::string path, StagedBlob::NewPath(staging_folder_));
+    const auto remove = absl::MakeCleanup([&] { std::remove(path.c_str()); });
+    MW_ASSIGN_OR_RETURN(const std::unique_ptr<StagedBlob> staged, StagedBlob::Open(path));
     while (reader.Read(&request)) {
-      bytes += request.chunk();
-      if (bytes.size() > kMaxBlobBytes) {
+      const std::string& chunk = request.chunk();
+      if (staged->size_bytes() + static_cast<int64_t>(chunk.size()) > kMaxBlobBytes) {
         return absl::InvalidArgumentError(absl::StrCat("chunk: more than ", kMaxBlobBytes, " bytes"));
       }
+      MW_RETURN_IF_ERROR(
+          staged->Append(absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(chunk.data()), chunk.size())));
     }
-    if (const std::string digest = Sha256Hex(bytes); digest != expected) {
+    if (const std::string digest = staged->HexDigest(); digest != expected) {
       return absl::InvalidArgumentError(absl::StrCat("digest is ", expected, ", the bytes have ", digest));
     }
-    return blobs_.Put(bytes);
+    MW_RETURN_IF_ERROR(staged->Sync());
+    MW_RETURN_IF_ERROR(staged->Adopt(blobs_));
+    return expected;
   }
 
   WorkerService& service_;
   BlobStore& blobs_;
+  const std::string staging_folder_;
 };
 
 class RealGrpcServer final : public GrpcServer {
@@ -238,7 +248,7 @@ class RealGrpcServer final : public GrpcServer {
       : reconstructions_(reconstructions),
         workers_(workers),
         reconstruction_service_impl_(reconstructions, workers),
-        worker_service_impl_(workers, blobs) {}
+        worker_service_impl_(workers, blobs, reconstructions.staging_folder()) {}
   ~RealGrpcServer() override { Shutdown(absl::Seconds(1)); }
 
   absl::Status Listen(const std::string& address, GrpcServer::Interceptors interceptors) {

@@ -8,6 +8,7 @@
 #include "common/image/decode.h"
 #include "common/image/encode.h"
 #include "common/image/resize.h"
+#include "coordinator/api/scene_upload.h"
 #include "coordinator/rest/json.h"
 #include "coordinator/rest/problem.h"
 #include "coordinator/rest/routes.h"
@@ -16,7 +17,6 @@ namespace meshwright {
 namespace {
 
 constexpr int64_t kMaxPartBytes = int64_t{256} << 20;
-constexpr int64_t kMaxFileBytes = int64_t{1} << 40;
 constexpr int kJpegQuality = 85;
 constexpr char kOffsetHeader[] = "Upload-Offset";
 
@@ -59,11 +59,11 @@ absl::Status GetFile(const RestContext& context, RestCall& call) {
 
 absl::Status PutFile(const RestContext& context, RestCall& call) {
   SceneFilePart part = {.path = call.path.at("path")};
-  MW_ASSIGN_OR_RETURN(part.size_bytes, QueryNumber(call, "size", 0, kMaxFileBytes, -1));
+  MW_ASSIGN_OR_RETURN(part.size_bytes, QueryNumber(call, "size", 0, kMaxSceneFileBytes, -1));
   if (part.size_bytes < 0) {
     return FieldError("size", absl::InvalidArgumentError("size is missing, expected the bytes of the whole file"));
   }
-  MW_ASSIGN_OR_RETURN(part.offset_bytes, QueryNumber(call, "offset", 0, kMaxFileBytes, 0));
+  MW_ASSIGN_OR_RETURN(part.offset_bytes, QueryNumber(call, "offset", 0, kMaxSceneFileBytes, 0));
   part.sha256 = call.request.Param("sha256");
   part.part_sha256 = call.request.Param("partSha256");
   auto begun = context.uploads->Begin(call.path.at("id"), part);

@@ -1,25 +1,25 @@
 #include "coordinator/rest/scene_uploads.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include <absl/strings/cord.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
-#include <fcntl.h>
+#include <absl/time/time.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/base/relative_path.h"
 #include "common/base/status_macros.h"
+#include "common/blob/blob_store.h"
+#include "common/json/parse_json.h"
 #include "coordinator/api/reconstruction_record.h"
-#include "coordinator/api/scene_upload.h"
 #include "coordinator/rest/problem.h"
 
 namespace meshwright {
@@ -29,25 +29,18 @@ namespace fs = std::filesystem;
 
 constexpr char kOffsetPayload[] = "meshwright/upload-offset";
 constexpr char kStateEnding[] = ".json";
-constexpr char kBytesEnding[] = ".part";
-constexpr size_t kPieceBytes = size_t{256} << 10;
-constexpr size_t kMaxPathLength = 1024;
-
-absl::Status CheckDigestText(const std::string& field, const std::string& text) {
-  const bool good = text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
-  if (good) return absl::OkStatus();
-  return FieldError(field, absl::InvalidArgumentError(absl::StrCat(field, " is \"", text.substr(0, 64),
-                                                                   "\", expected 64 lower-case hexadecimal digits")));
-}
+// Files that nobody went on with for so long are given up.
+constexpr absl::Duration kUnfinishedLifetime = absl::Hours(24 * 7);
+// More files than these at a time are read again when their next part comes.
+constexpr size_t kMaxDigests = 4096;
 
 absl::Status Check(const SceneFilePart& part) {
-  if (part.path.size() > kMaxPathLength) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("path has ", part.path.size(), " characters, expected at most ", kMaxPathLength));
-  }
   MW_RETURN_IF_ERROR(ValidateRelativePath(part.path));
-  MW_RETURN_IF_ERROR(CheckDigestText("sha256", part.sha256));
-  if (!part.part_sha256.empty()) MW_RETURN_IF_ERROR(CheckDigestText("partSha256", part.part_sha256));
+  if (const absl::Status valid = ValidateDigest(part.sha256, "sha256"); !valid.ok()) return FieldError("sha256", valid);
+  if (!part.part_sha256.empty()) {
+    const absl::Status valid = ValidateDigest(part.part_sha256, "partSha256");
+    if (!valid.ok()) return FieldError("partSha256", valid);
+  }
   if (part.offset_bytes > part.size_bytes) {
     return FieldError("offset", absl::InvalidArgumentError(absl::StrCat(
                                     "offset is ", part.offset_bytes, ", expected 0..", part.size_bytes, ", the size")));
@@ -66,18 +59,35 @@ std::string Encode(const SceneFileState& state) {
                          {"size_bytes", state.size_bytes},
                          {"sha256", state.sha256},
                          {"offset_bytes", state.offset_bytes},
-                         {"complete", state.complete}})
+                         {"complete", state.complete},
+                         {"staged_name", state.staged_name}})
       .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }
 
+template <typename Value>
+bool Take(const nlohmann::json& json, const char* name, Value& value) {
+  const auto found = json.find(name);
+  if (found == json.end()) return false;
+  if constexpr (std::is_same_v<Value, std::string>) {
+    if (!found->is_string()) return false;
+  } else if constexpr (std::is_same_v<Value, bool>) {
+    if (!found->is_boolean()) return false;
+  } else {
+    if (!found->is_number_integer()) return false;
+  }
+  value = found->template get<Value>();
+  return true;
+}
+
 std::optional<SceneFileState> Decode(const std::string& text) {
-  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-  if (!json.is_object() || !json.contains("path") || !json["path"].is_string()) return std::nullopt;
-  return SceneFileState{.path = json["path"],
-                        .size_bytes = json.value("size_bytes", int64_t{0}),
-                        .sha256 = json.value("sha256", ""),
-                        .offset_bytes = json.value("offset_bytes", int64_t{0}),
-                        .complete = json.value("complete", false)};
+  const absl::StatusOr<nlohmann::json> json = ParseJson(text);
+  if (!json.ok() || !json->is_object()) return std::nullopt;
+  SceneFileState state;
+  const bool known = Take(*json, "path", state.path) && Take(*json, "size_bytes", state.size_bytes) &&
+                     Take(*json, "sha256", state.sha256) && Take(*json, "offset_bytes", state.offset_bytes) &&
+                     Take(*json, "complete", state.complete) && Take(*json, "staged_name", state.staged_name);
+  if (!known || (!state.staged_name.empty() && !ValidateRelativePath(state.staged_name).ok())) return std::nullopt;
+  return state;
 }
 
 std::optional<SceneFileState> Load(const std::string& state_path) {
@@ -97,52 +107,6 @@ absl::Status WrongOffset(int64_t offset, int64_t expected) {
 }
 
 }  // namespace
-
-// The bytes of a file that is not complete.
-class PartialFile {
- public:
-  static absl::StatusOr<std::unique_ptr<PartialFile>> Open(const std::string& path) {
-    const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (descriptor < 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be kept");
-    return std::unique_ptr<PartialFile>(new PartialFile(descriptor));
-  }
-  PartialFile(const PartialFile&) = delete;
-  PartialFile& operator=(const PartialFile&) = delete;
-  ~PartialFile() { ::close(descriptor_); }
-
-  absl::Status Write(absl::Span<const uint8_t> bytes, int64_t offset) {
-    while (!bytes.empty()) {
-      const ssize_t written = ::pwrite(descriptor_, bytes.data(), bytes.size(), offset);
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be kept");
-      bytes.remove_prefix(static_cast<size_t>(written));
-      offset += written;
-    }
-    return absl::OkStatus();
-  }
-  // As many bytes as there are, at most `count`.
-  absl::StatusOr<std::string> Read(int64_t offset, size_t count) const {
-    std::string bytes(count, '\0');
-    size_t done = 0;
-    while (done < count) {
-      const ssize_t got = ::pread(descriptor_, &bytes[done], count - done, offset + static_cast<int64_t>(done));
-      if (got < 0 && errno == EINTR) continue;
-      if (got < 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be read");
-      if (got == 0) break;
-      done += static_cast<size_t>(got);
-    }
-    bytes.resize(done);
-    return bytes;
-  }
-  absl::Status Sync() {
-    if (::fdatasync(descriptor_) != 0) return absl::ErrnoToStatus(errno, "the parts of a file cannot be kept");
-    return absl::OkStatus();
-  }
-
- private:
-  explicit PartialFile(int descriptor) : descriptor_(descriptor) {}
-  const int descriptor_;
-};
 
 absl::StatusOr<std::unique_ptr<SceneUploads>> SceneUploads::Open(const std::string& folder,
                                                                  ReconstructionService& service) {
@@ -178,27 +142,38 @@ absl::Status SceneUploads::Save(const std::string& id, const SceneFileState& sta
   return WriteFileAtomically(StatePath(id, state.path), Encode(state));
 }
 
-absl::Status SceneUploads::Deliver(const std::string& id, const SceneFileState& state) const {
-  v1::UploadSceneFileRequest::Header header;
-  header.set_reconstruction_id(id);
-  header.set_path(state.path);
-  header.set_size_bytes(state.size_bytes);
-  header.set_sha256(state.sha256);
-  MW_ASSIGN_OR_RETURN(SceneFileUpload upload, service_.BeginUpload(header));
-  MW_ASSIGN_OR_RETURN(const auto file, PartialFile::Open(StatePath(id, state.path) + kBytesEnding));
-  Sha256Stream stream;
-  for (int64_t offset = 0; offset < state.size_bytes;) {
-    MW_ASSIGN_OR_RETURN(const std::string piece, file->Read(offset, kPieceBytes));
-    if (piece.empty()) break;  // the digest says so
-    const std::string bytes = piece.substr(
-        0, static_cast<size_t>(std::min<int64_t>(static_cast<int64_t>(piece.size()), state.size_bytes - offset)));
-    stream.Update(absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()));
-    MW_RETURN_IF_ERROR(upload.Append(bytes));
-    offset += static_cast<int64_t>(bytes.size());
+std::string SceneUploads::StagedPath(const SceneFileState& state) const {
+  return absl::StrCat(service_.staging_folder(), "/", state.staged_name);
+}
+
+// A file for the bytes of `state`, behind those that are there.
+absl::StatusOr<std::unique_ptr<StagedBlob>> SceneUploads::Stage(const std::string& state_path, SceneFileState& state) {
+  if (state.offset_bytes == 0) {
+    std::error_code error;
+    if (!state.staged_name.empty()) fs::remove(StagedPath(state), error);
+    MW_ASSIGN_OR_RETURN(const std::string path, StagedBlob::NewPath(service_.staging_folder()));
+    state.staged_name = fs::path(path).filename();
+    return StagedBlob::Open(path);
   }
-  const std::string digest = stream.HexDigest();
-  if (digest != state.sha256) return WrongDigest("sha256", state.sha256, digest);
-  return upload.Finish();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto known = digests_.find(state_path);
+    if (known != digests_.end()) return StagedBlob::Open(StagedPath(state), state.offset_bytes, known->second);
+  }
+  MW_ASSIGN_OR_RETURN(const Sha256Stream digest, StagedBlob::DigestOf(StagedPath(state), state.offset_bytes));
+  Remember(state_path, digest);
+  return StagedBlob::Open(StagedPath(state), state.offset_bytes, digest);
+}
+
+void SceneUploads::Remember(const std::string& state_path, const Sha256Stream& digest) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (digests_.size() >= kMaxDigests) digests_.erase(digests_.begin());
+  digests_.insert_or_assign(state_path, digest);
+}
+
+void SceneUploads::Forget(const std::string& state_path) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  digests_.erase(state_path);
 }
 
 bool SceneUploads::HasTaken(const std::string& id, const SceneFileState& state) const {
@@ -231,12 +206,23 @@ absl::StatusOr<std::unique_ptr<ScenePartUpload>> SceneUploads::Begin(const std::
     return upload;
   }
   if (!same_file && part.offset_bytes == 0) {
-    state = {.path = part.path, .size_bytes = part.size_bytes, .sha256 = part.sha256};
+    state = {.path = part.path, .size_bytes = part.size_bytes, .sha256 = part.sha256, .staged_name = state.staged_name};
   }
   const int64_t expected = same_file || part.offset_bytes == 0 ? state.offset_bytes : 0;
   if (part.offset_bytes > expected) return WrongOffset(part.offset_bytes, expected);
-  MW_ASSIGN_OR_RETURN(upload->file_, PartialFile::Open(state_path + kBytesEnding));
   if (part.offset_bytes < state.offset_bytes) upload->kind_ = ScenePartUpload::Kind::kRepeated;
+  auto staged = Stage(state_path, state);
+  if (absl::IsDataLoss(staged.status())) {
+    // The bytes are gone, whoever took them: all of the file again.
+    state.offset_bytes = 0;
+    MW_RETURN_IF_ERROR(Save(id, state));
+    if (part.offset_bytes > 0) return WrongOffset(part.offset_bytes, 0);
+    upload->kind_ = ScenePartUpload::Kind::kNew;
+    staged = Stage(state_path, state);
+  }
+  MW_RETURN_IF_ERROR(staged.status());
+  upload->staged_ = *std::move(staged);
+  if (part.offset_bytes > 0) upload->part_digest_.emplace();
   return upload;
 }
 
@@ -244,6 +230,10 @@ ScenePartUpload::ScenePartUpload(SceneUploads& uploads, std::string id, SceneFil
     : uploads_(uploads), id_(std::move(id)), part_(std::move(part)), state_path_(std::move(state_path)) {}
 
 ScenePartUpload::~ScenePartUpload() {
+  if (staged_ != nullptr && state_.offset_bytes == 0) {
+    std::error_code error;
+    fs::remove(staged_->path(), error);  // nobody would know of it
+  }
   const std::lock_guard<std::mutex> lock(uploads_.mutex_);
   uploads_.busy_.erase(state_path_);
 }
@@ -255,7 +245,7 @@ absl::Status ScenePartUpload::Append(absl::Span<const uint8_t> bytes) {
   const int64_t end = part_.offset_bytes + received_bytes_;
   if (kind_ == Kind::kRepeated) {
     if (end > state_.offset_bytes) return WrongOffset(part_.offset_bytes, state_.offset_bytes);
-    MW_ASSIGN_OR_RETURN(const std::string there, file_->Read(begin, bytes.size()));
+    MW_ASSIGN_OR_RETURN(const std::string there, staged_->Read(begin, bytes.size()));
     if (there.size() == bytes.size() && std::memcmp(there.data(), bytes.data(), bytes.size()) == 0) {
       return absl::OkStatus();
     }
@@ -267,37 +257,52 @@ absl::Status ScenePartUpload::Append(absl::Span<const uint8_t> bytes) {
                               FieldError("size", absl::InvalidArgumentError(absl::StrCat(
                                                      "size is ", part_.size_bytes, ", the part has bytes beyond it"))));
   }
-  digest_.Update(bytes);
-  return file_->Write(bytes, begin);
+  if (part_digest_) part_digest_->Update(bytes);
+  return staged_->Append(bytes);
+}
+
+absl::Status ScenePartUpload::CheckPart() const {
+  if (part_.part_sha256.empty() && received_bytes_ < part_.size_bytes) {
+    return FieldError("partSha256", absl::InvalidArgumentError(absl::StrCat(
+                                        "partSha256 is missing, and the part has ", received_bytes_, " of ",
+                                        part_.size_bytes, " bytes: expected for a part that is not the whole file")));
+  }
+  if (part_.part_sha256.empty()) return absl::OkStatus();
+  const std::string digest = part_digest_ ? Sha256Stream(*part_digest_).HexDigest() : staged_->HexDigest();
+  return digest == part_.part_sha256 ? absl::OkStatus() : WrongDigest("partSha256", part_.part_sha256, digest);
 }
 
 absl::StatusOr<SceneFileState> ScenePartUpload::Finish() {
   if (kind_ != Kind::kNew) return state_;
-  const std::string digest = digest_.HexDigest();
-  if (!part_.part_sha256.empty()) {
-    if (digest != part_.part_sha256) {
-      return WithExpectedOffset(state_.offset_bytes, WrongDigest("partSha256", part_.part_sha256, digest));
-    }
-  } else if (received_bytes_ < part_.size_bytes) {
-    return WithExpectedOffset(
-        state_.offset_bytes,
-        FieldError("partSha256", absl::InvalidArgumentError(absl::StrCat(
-                                     "partSha256 is missing, and the part has ", received_bytes_, " of ",
-                                     part_.size_bytes, " bytes: expected for a part that is not the whole file"))));
-  }
-  MW_RETURN_IF_ERROR(file_->Sync());
+  MW_RETURN_IF_ERROR(WithExpectedOffset(state_.offset_bytes, CheckPart()));
+  MW_RETURN_IF_ERROR(staged_->Sync());
   state_.offset_bytes += received_bytes_;
   if (state_.offset_bytes < state_.size_bytes) {
+    uploads_.Remember(state_path_, staged_->digest());
     MW_RETURN_IF_ERROR(uploads_.Save(id_, state_));
     return state_;
   }
-  const absl::Status delivered = uploads_.Deliver(id_, state_);
-  if (HttpStatusOf(delivered) == 422) state_.offset_bytes = 0;  // nobody knows which part was wrong
+  return FinishFile();
+}
+
+absl::StatusOr<SceneFileState> ScenePartUpload::FinishFile() {
+  absl::Status delivered;
+  if (const std::string digest = staged_->HexDigest(); digest != state_.sha256) {
+    delivered = WrongDigest("sha256", state_.sha256, digest);
+    state_.offset_bytes = 0;  // nobody knows which part was wrong
+  } else {
+    delivered = uploads_.service_.AdoptSceneFile(
+        id_, {.path = state_.path, .size_bytes = state_.size_bytes, .digest = state_.sha256}, staged_->path());
+  }
   state_.complete = delivered.ok();
+  if (delivered.ok()) state_.staged_name.clear();
+  if (delivered.ok() || state_.offset_bytes == 0) {
+    uploads_.Forget(state_path_);
+  } else {
+    uploads_.Remember(state_path_, staged_->digest());
+  }
   MW_RETURN_IF_ERROR(uploads_.Save(id_, state_));
   MW_RETURN_IF_ERROR(WithExpectedOffset(state_.offset_bytes, delivered));
-  std::error_code error;
-  fs::remove(state_path_ + kBytesEnding, error);
   return state_;
 }
 
@@ -349,8 +354,29 @@ void SceneUploads::Sweep() const {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) folders.push_back(entry.path());
   for (const fs::path& folder : folders) {
     const absl::Status status = CheckTakesFiles(folder.filename());
-    if (absl::IsNotFound(status) || absl::IsFailedPrecondition(status)) fs::remove_all(folder, error);
+    if (absl::IsNotFound(status) || absl::IsFailedPrecondition(status)) RemoveFolder(folder.filename());
   }
+  RemoveExpired();
+}
+
+void SceneUploads::RemoveExpired() const {
+  const auto oldest = fs::file_time_type::clock::now() - absl::ToChronoSeconds(kUnfinishedLifetime);
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(service_.staging_folder(), error)) {
+    std::error_code of_file;
+    if (!entry.is_regular_file(of_file) || entry.last_write_time(of_file) > oldest || of_file) continue;
+    fs::remove(entry.path(), of_file);
+  }
+}
+
+void SceneUploads::RemoveFolder(const std::string& id) const {
+  const fs::path folder = fs::path(folder_) / id;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::optional<SceneFileState> state = Load(entry.path());
+    if (state && !state->staged_name.empty()) fs::remove(StagedPath(*state), error);
+  }
+  fs::remove_all(folder, error);
 }
 
 }  // namespace meshwright

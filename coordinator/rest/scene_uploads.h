@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,6 +14,7 @@
 #include <absl/types/span.h>
 
 #include "common/base/digest.h"
+#include "common/blob/staged_blob.h"
 #include "coordinator/api/reconstruction_service.h"
 
 namespace meshwright {
@@ -24,6 +26,7 @@ struct SceneFileState {
   std::string sha256;
   int64_t offset_bytes = 0;  // that are there
   bool complete = false;     // the reconstruction has it
+  std::string staged_name;   // of the file with the bytes, in the staging folder; "" when there are none
 };
 
 // One part of a file: bytes [offset_bytes, offset_bytes + its length).
@@ -36,9 +39,8 @@ struct SceneFilePart {
 };
 
 class SceneUploads;
-class PartialFile;
 
-// One part on its way. Destroying it without Finish() leaves the file as it was before.
+// One part on its way. Destroying it without Finish() leaves of the file what was there before.
 class ScenePartUpload {
  public:
   ~ScenePartUpload();
@@ -57,6 +59,8 @@ class ScenePartUpload {
     kKnown,     // the reconstruction has the file
   };
   ScenePartUpload(SceneUploads& uploads, std::string id, SceneFilePart part, std::string state_path);
+  absl::Status CheckPart() const;
+  absl::StatusOr<SceneFileState> FinishFile();
 
   SceneUploads& uploads_;
   const std::string id_;
@@ -64,14 +68,14 @@ class ScenePartUpload {
   const std::string state_path_;
   Kind kind_ = Kind::kNew;
   SceneFileState state_;
-  std::unique_ptr<PartialFile> file_;
-  Sha256Stream digest_;  // of the part
+  std::unique_ptr<StagedBlob> staged_;
+  std::optional<Sha256Stream> part_digest_;  // where it is not that of the whole file
   int64_t received_bytes_ = 0;
 };
 
-// Files of scenes that arrive in parts, each with its digest, over any number of connections and restarts. What is
-// incomplete lies in a folder of its own; a complete file goes to the reconstruction as any other upload does.
-// Thread-safe.
+// Files of scenes that arrive in parts, each with its digest, over any number of connections and restarts. A byte is
+// written once, where the blob store can take it over, and hashed while it comes; parts have a digest of their own,
+// which hashes it a second time. How far each file is stands in a folder of its own. Thread-safe.
 class SceneUploads {
  public:
   // Makes the folder when it is not there.
@@ -84,7 +88,7 @@ class SceneUploads {
   absl::StatusOr<SceneFileState> Get(const std::string& id, const std::string& path) const;
   // Those begun here and those that the reconstruction has, by path; none once it was started.
   absl::StatusOr<std::vector<SceneFileState>> List(const std::string& id) const;
-  // Removes what belongs to reconstructions that take no files any more.
+  // Removes what belongs to reconstructions that take no files any more, and bytes that nobody added to for a week.
   void Sweep() const;
 
  private:
@@ -93,14 +97,21 @@ class SceneUploads {
 
   absl::Status CheckTakesFiles(const std::string& id) const;
   std::string StatePath(const std::string& id, const std::string& path) const;
+  std::string StagedPath(const SceneFileState& state) const;
   absl::Status Save(const std::string& id, const SceneFileState& state) const;
   bool HasTaken(const std::string& id, const SceneFileState& state) const;
-  absl::Status Deliver(const std::string& id, const SceneFileState& state) const;
+  absl::StatusOr<std::unique_ptr<StagedBlob>> Stage(const std::string& state_path, SceneFileState& state);
+  void Remember(const std::string& state_path, const Sha256Stream& digest);
+  void Forget(const std::string& state_path);
+  void RemoveFolder(const std::string& id) const;
+  void RemoveExpired() const;
 
   const std::string folder_;
   ReconstructionService& service_;
   std::mutex mutex_;
   std::set<std::string> busy_;  // state paths of the files that a part arrives for
+  // By state path: the digest so far of files that are not complete, so that nobody has to read them again.
+  std::map<std::string, Sha256Stream> digests_;
 };
 
 // Where a file that an error is about should go on, if that is known.

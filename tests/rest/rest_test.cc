@@ -1,5 +1,6 @@
 // The REST interface over real connections: a scene uploaded in parts, followed, looked at and downloaded.
 
+#include <map>
 #include <set>
 #include <sstream>
 
@@ -309,6 +310,52 @@ TEST_F(RestTest, ADigestThatIsWrongMeansAllOfTheFileAgain) {
   EXPECT_EQ(refused->get_header_value("Upload-Offset"), "0");
   EXPECT_EQ(put(Sha256Hex(std::string("abcdef")), 0, "abc")->status, 200);
   EXPECT_EQ(put(Sha256Hex(std::string("abcdef")), 3, "def")->status, 200);
+}
+
+// Bytes that this process has read from and written to files so far; sockets do not count.
+std::pair<int64_t, int64_t> FileBytes() {
+  std::istringstream lines(*ReadFile("/proc/self/io"));
+  std::map<std::string, int64_t> counts;
+  std::string name;
+  int64_t count = 0;
+  while (lines >> name >> count) counts[name] = count;
+  return {counts["rchar:"], counts["wchar:"]};
+}
+
+TEST_F(RestTest, AByteIsWrittenOnceAndNotReadAgain) {
+  Create("once");
+  constexpr size_t kBytes = 24 << 20;
+  std::string content(kBytes, '\0');
+  for (size_t i = 0; i < kBytes; i += 7) content[i] = static_cast<char>(i);
+  const auto [read, written] = FileBytes();
+  ASSERT_EQ(PutPart("once", "whole.bin", content, 0, kBytes)->status, 200);
+  const auto [read_whole, written_whole] = FileBytes();
+  EXPECT_LT(read_whole - read, kBytes / 10);
+  EXPECT_LT(written_whole - written, kBytes + kBytes / 10);
+  EXPECT_GE(written_whole - written, kBytes);
+  content[0] = 'x';
+  for (size_t third = 0; third < 3; ++third) {
+    ASSERT_EQ(PutPart("once", "parts.bin", content, third * kBytes / 3, kBytes / 3)->status, 200);
+  }
+  const auto [read_parts, written_parts] = FileBytes();
+  EXPECT_LT(read_parts - read_whole, kBytes / 10);
+  EXPECT_LT(written_parts - written_whole, kBytes + kBytes / 10);
+  EXPECT_EQ(GetJson("/v1/reconstructions/once/files")["files"].size(), 2U);
+}
+
+TEST_F(RestTest, AnUploadWhoseBytesAreGoneBeginsAnew) {
+  Create("gone");
+  const std::string content = "a wall of bytes";
+  ASSERT_EQ(PutPart("gone", "x.bin", content, 0, 6)->status, 200);
+  std::filesystem::remove_all(folder_ + "/data/blobs/staging");
+  const auto lost = PutPart("gone", "x.bin", content, 6, 9);
+  EXPECT_EQ(lost->status, 409);
+  EXPECT_EQ(lost->get_header_value("Upload-Offset"), "0");
+  EXPECT_EQ(PutPart("gone", "x.bin", content, 0, 6)->status, 200);
+  const auto last = PutPart("gone", "x.bin", content, 6, 9);
+  EXPECT_EQ(last->status, 200);
+  EXPECT_TRUE(Json::parse(last->body)["complete"].get<bool>());
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ + "/data/blobs/staging"));
 }
 
 TEST_F(RestTest, ATokenIsAskedForWhenThereIsOne) {

@@ -6,6 +6,8 @@
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 
+#include "common/json/parse_json.h"
+
 namespace meshwright {
 namespace {
 
@@ -117,8 +119,9 @@ void MeasuredWorkerChannel::CountOutcomes(const v1::SynchronizeRequest& request)
 }
 
 void MeasuredWorkerChannel::CountFinished(const v1::HeldJob::Finished& finished) {
-  const auto report = nlohmann::json::parse(finished.report_json(), nullptr, false);
-  if (!report.is_object()) return;
+  const absl::StatusOr<nlohmann::json> parsed = ParseJson(finished.report_json());
+  if (!parsed.ok() || !parsed->is_object()) return;
+  const nlohmann::json& report = *parsed;
   for (const ReportedCount& count : kReportedCounts) {
     if (const auto field = report.find(count.field); field != report.end() && field->is_number()) {
       metrics_.Counter(count.metric, count.help).Increment(field->get<double>());
