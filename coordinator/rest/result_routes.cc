@@ -48,6 +48,12 @@ absl::Status DownloadPart(const RestContext& context, RestCall& call) {
   return SendFile(call, std::move(file), key, kPlyType, absl::StrCat(call.path.at("id"), "-", part.sequence(), ".ply"));
 }
 
+absl::Status DownloadSurface(const RestContext& context, RestCall& call) {
+  MW_ASSIGN_OR_RETURN(const v1::Part part, FindPart(context, call));
+  return SendImmutable(call, part.sha256(), "application/octet-stream",
+                       [&] { return context.blobs->Get(part.sha256()); });
+}
+
 absl::Status PreviewPart(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const int64_t max_faces,
                       QueryNumber(call, "max_faces", 1, kMaxPreviewFaces, kDefaultPreviewFaces));
@@ -146,6 +152,7 @@ void AddResultRoutes(const RestContext& context, std::vector<Route>& routes) {
   };
   add("/v1/reconstructions/{id}/parts", {"after"}, ListParts);
   add("/v1/reconstructions/{id}/parts/{sequence}", {}, DownloadPart);
+  add("/v1/reconstructions/{id}/parts/{sequence}/surface", {}, DownloadSurface);
   add("/v1/reconstructions/{id}/parts/{sequence}/preview", {"max_faces"}, PreviewPart);
   add("/v1/reconstructions/{id}/mesh", {"partial", "format"}, DownloadMesh);
   add("/v1/reconstructions/{id}/mesh.glb", {}, DownloadGlb);

@@ -149,6 +149,8 @@ TEST_F(RestTest, FromAnInterruptedUploadToTheMesh) {
   const auto ply = ParsePly(http_->Get(part)->body, "part");
   ASSERT_TRUE(ply.ok()) << ply.status();
   EXPECT_FALSE(ply->faces.empty());
+  const auto surface = http_->Get(part + "/surface");
+  EXPECT_EQ(Sha256Hex(surface->body), parts[0]["sha256"]);
   const auto preview = http_->Get(part + "/preview?max_faces=50");
   EXPECT_THAT(preview->body, StartsWith("MWPV"));
   EXPECT_LE(preview->body[20], 50);
