@@ -1,22 +1,17 @@
 #include "coordinator/rest/downloads.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <utility>
 #include <vector>
 
-#include <absl/strings/match.h>
-#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 #include <absl/strings/strip.h>
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "common/base/digest.h"
 #include "common/base/status_macros.h"
+#include "common/http_server/byte_range.h"
 #include "coordinator/rest/problem.h"
 
 namespace meshwright {
@@ -28,56 +23,7 @@ constexpr size_t kFilesKept = 8;
 
 std::string Quoted(const std::string& etag) { return absl::StrCat("\"", etag, "\""); }
 
-bool IsNumber(const std::string& text) {
-  return !text.empty() && text.size() <= 18 && text.find_first_not_of("0123456789") == std::string::npos;
-}
-
 }  // namespace
-
-absl::StatusOr<std::shared_ptr<const OpenedFile>> OpenedFile::Open(const std::string& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat status = {};
-  if (descriptor >= 0 && ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode)) {
-    return std::shared_ptr<const OpenedFile>(new OpenedFile(descriptor, status.st_size));
-  }
-  if (descriptor >= 0) ::close(descriptor);
-  return errno == ENOENT ? absl::NotFoundError("the file is not there")
-                         : absl::DataLossError("the file cannot be read");
-}
-
-OpenedFile::~OpenedFile() { ::close(descriptor_); }
-
-absl::StatusOr<size_t> OpenedFile::Read(int64_t offset, char* bytes, size_t count) const {
-  while (true) {
-    const ssize_t got = ::pread(descriptor_, bytes, count, offset);
-    if (got > 0) return static_cast<size_t>(got);
-    if (got == 0 || errno != EINTR) return absl::DataLossError("the file cannot be read");
-  }
-}
-
-ByteRange ParseByteRange(const std::string& header, int64_t size_bytes) {
-  constexpr char kUnit[] = "bytes=";
-  const ByteRange whole = {ByteRange::Kind::kWhole, 0, size_bytes};
-  if (!absl::StartsWith(header, kUnit)) return whole;
-  const std::vector<std::string> ends = absl::StrSplit(header.substr(sizeof(kUnit) - 1), '-');
-  if (ends.size() != 2) return whole;
-  int64_t first = 0;
-  int64_t last = 0;
-  if (ends[0].empty()) {  // the last so many bytes
-    if (!IsNumber(ends[1]) || !absl::SimpleAtoi(ends[1], &last)) return whole;
-    if (last == 0 || size_bytes == 0) return {ByteRange::Kind::kUnsatisfiable};
-    const int64_t count = std::min(last, size_bytes);
-    return {ByteRange::Kind::kPart, size_bytes - count, count};
-  }
-  if (!IsNumber(ends[0]) || !absl::SimpleAtoi(ends[0], &first)) return whole;
-  last = size_bytes - 1;
-  if (!ends[1].empty()) {
-    if (!IsNumber(ends[1]) || !absl::SimpleAtoi(ends[1], &last) || last < first) return whole;
-    last = std::min(last, size_bytes - 1);
-  }
-  if (first >= size_bytes) return {ByteRange::Kind::kUnsatisfiable};
-  return {ByteRange::Kind::kPart, first, last - first + 1};
-}
 
 bool HasCopy(const RestCall& call, const std::string& etag) {
   const std::string header = call.request.headers.Get("If-None-Match");

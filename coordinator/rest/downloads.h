@@ -10,37 +10,10 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "common/base/opened_file.h"
 #include "coordinator/rest/router.h"
 
 namespace meshwright {
-
-// A file that is open for reading; it stays readable when its name is removed.
-class OpenedFile {
- public:
-  static absl::StatusOr<std::shared_ptr<const OpenedFile>> Open(const std::string& path);
-  ~OpenedFile();
-  OpenedFile(const OpenedFile&) = delete;
-  OpenedFile& operator=(const OpenedFile&) = delete;
-
-  int64_t size_bytes() const { return size_bytes_; }
-  // Reads up to `count` bytes; DataLoss when there are none.
-  absl::StatusOr<size_t> Read(int64_t offset, char* bytes, size_t count) const;
-
- private:
-  OpenedFile(int descriptor, int64_t size_bytes) : descriptor_(descriptor), size_bytes_(size_bytes) {}
-  const int descriptor_;
-  const int64_t size_bytes_;
-};
-
-// What one range of a Range header (RFC 9110, section 14) means for `size_bytes` bytes.
-struct ByteRange {
-  enum class Kind { kWhole, kPart, kUnsatisfiable };
-  Kind kind = Kind::kWhole;
-  int64_t first = 0;
-  int64_t count = 0;
-};
-// Whole when the header is not one range that can be understood, as the RFC asks.
-ByteRange ParseByteRange(const std::string& header, int64_t size_bytes);
 
 // Answers with the file or the range of it that was asked for: 200, 206, 304 or 416. `etag` without its quotation
 // marks. `name` is what a browser saves it as.
