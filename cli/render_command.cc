@@ -37,6 +37,7 @@ struct Arguments {
   Shading shading = Shading::kColors;
   std::string picture;
   bool compare = false;
+  std::string ground_truth;
   int threads = AvailableCores();
 };
 
@@ -86,10 +87,16 @@ absl::Status Compare(const Arguments& arguments, const Scene& scene, const Drawi
   for (const SceneView& view : scene.views) {
     if (view.name != arguments.camera) continue;
     MW_ASSIGN_OR_RETURN(const View photograph, LoadView(view, arguments.max_image_size));
-    const PictureComparison comparison =
-        CompareWhereCovered(picture, photograph.color, drawing.colored().caster(), camera, pool);
-    std::printf("%.2f dB PSNR over the %.1f%% of the photograph that are covered\n", comparison.psnr_db,
-                100 * comparison.share);
+    std::optional<MeshRayCaster> truth;
+    if (!arguments.ground_truth.empty()) {
+      const absl::StatusOr<TriangleMesh> mesh = ReadPly(arguments.ground_truth);
+      if (!mesh.ok()) return BadInput(mesh.status());
+      truth.emplace(*mesh);
+    }
+    const PictureComparison comparison = CompareWhereCovered(picture, photograph.color, drawing.colored().caster(),
+                                                             camera, pool, truth.has_value() ? &*truth : nullptr);
+    std::printf("%.2f dB PSNR over the %.1f%% of the photograph that are %s\n", comparison.psnr_db,
+                100 * comparison.share, truth.has_value() ? "covered by right depths" : "covered");
     if (drawing.textured() != nullptr) {
       const EdgeJumps jumps = MeasureEdgeJumps(*drawing.textured());
       std::printf("%.2f grey levels across %s edges between pieces of photographs, %.2f across others\n",
@@ -118,6 +125,9 @@ int RunCommand(const Arguments& arguments) {
   if (arguments.compare && (arguments.orbit_deg != 0 || arguments.pitch_deg != 0)) {
     return FailWrongUse(
         "--compare is given, expected no --orbit-deg and no --pitch-deg: there is no photograph from there");
+  }
+  if (!arguments.ground_truth.empty() && !arguments.compare) {
+    return FailWrongUse("--ground-truth is given, expected --compare with it: it says where to compare");
   }
   const absl::Status status = RenderMesh(arguments);
   return status.ok() ? kExitDone : Fail(status);
@@ -148,6 +158,8 @@ void AddRenderCommand(CLI::App& program, Run& run) {
       ->type_name("SHADING")
       ->default_str("colors");
   command.add_flag("--compare", arguments->compare, "print how far the picture is from the photograph");
+  command.add_option("--ground-truth", arguments->ground_truth,
+                     "compare only where the surface is within 4 footprints of this one, PLY: colours, not holes");
   AddThreadsOption(command, arguments->threads);
   command.callback([arguments, &run] { run = [arguments] { return RunCommand(*arguments); }; });
 }

@@ -4,9 +4,17 @@
 #include <vector>
 
 namespace meshwright {
+namespace {
+
+bool IsRight(double distance, const RayHit& truth, const Camera& camera) {
+  return truth.ok() && std::abs(distance - truth.distance) <= kRightFootprints * truth.distance / camera.focal();
+}
+
+}  // namespace
 
 PictureComparison CompareWhereCovered(const ColorImage& picture, const ColorImage& photograph,
-                                      const MeshRayCaster& surface, const Camera& camera, ThreadPool& pool) {
+                                      const MeshRayCaster& surface, const Camera& camera, ThreadPool& pool,
+                                      const MeshRayCaster* truth) {
   const auto height = static_cast<size_t>(camera.height);
   const auto width = static_cast<size_t>(camera.width);
   const Eigen::Vector3d center = camera.center_in_world();
@@ -18,7 +26,9 @@ PictureComparison CompareWhereCovered(const ColorImage& picture, const ColorImag
       for (size_t column = 0; column < width; ++column) {
         const Eigen::Vector3d direction =
             world_from_cam * camera.RayInCam(static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
-        if (!surface.Cast(center, direction).ok()) continue;
+        const RayHit hit = surface.Cast(center, direction);
+        if (!hit.ok()) continue;
+        if (truth != nullptr && !IsRight(hit.distance, truth->Cast(center, direction), camera)) continue;
         ++pixels[row];
         for (size_t k = 3 * (row * width + column); k < 3 * (row * width + column) + 3; ++k) {
           const double difference = static_cast<double>(picture.rgb[k]) - photograph.rgb[k];
