@@ -239,7 +239,7 @@ class LocalReconstruction {
     const auto count = static_cast<int>(surfaces.size());
     int loaded = 0;  // each at least twice
     const auto loading = [&] { Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count); };
-    const std::string ply_path = IsPly(*format_) ? settings_.output_path : settings_.work_folder + "/mesh.ply";
+    const std::string ply_path = IsPly(*format_) ? settings_.output_path : work_->MeshPath();
     MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts,
                         WriteAcceptedMesh(surfaces, work_->blobs(), options_.join, ply_path, pool_, loading));
     if (counts.faces == 0) {

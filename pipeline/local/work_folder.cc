@@ -25,6 +25,7 @@ namespace fs = std::filesystem;
 
 constexpr char kState[] = "state.sqlite";
 constexpr char kBlobs[] = "blobs";
+constexpr char kMesh[] = "mesh.ply";
 
 absl::Status SystemError(const std::string& path, const std::string& what, int error) {
   const std::string message = absl::StrCat(path, ": ", what, ": ", std::strerror(error));
@@ -100,6 +101,8 @@ absl::Status WorkFolder::OpenStores(const std::string& scene_digest, const std::
   return absl::OkStatus();
 }
 
+std::string WorkFolder::MeshPath() const { return absl::StrCat(path_, "/", kMesh); }
+
 absl::Status WorkFolder::RemoveContents() {
   store_.reset();
   blobs_.reset();
@@ -111,6 +114,8 @@ absl::Status WorkFolder::RemoveContents() {
   }
   fs::remove_all(fs::path(path_) / kBlobs, error);
   if (error) return SystemError(path_, "cannot remove the surfaces", error.value());
+  fs::remove(MeshPath(), error);
+  if (error) return SystemError(path_, "cannot remove the mesh", error.value());
   return absl::OkStatus();
 }
 

@@ -32,6 +32,8 @@ class WorkFolder {
 
   JobStore& store() { return *store_; }
   BlobStore& blobs() { return *blobs_; }
+  // For the mesh when another format is to be made of it.
+  std::string MeshPath() const;
   // Whether there was something to go on from.
   bool resumed() const { return resumed_; }
 

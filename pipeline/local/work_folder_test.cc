@@ -74,6 +74,15 @@ TEST_F(WorkFolderTest, RestartThrowsAwayWhatItHolds) {
   EXPECT_FALSE(*(*folder)->blobs().Has(digest));
 }
 
+TEST_F(WorkFolderTest, RemovedNothingIsLeft) {
+  auto folder = Open('a', "{}");
+  ASSERT_TRUE(folder.ok()) << folder.status();
+  ASSERT_TRUE((*folder)->blobs().Put("surface").ok());
+  ASSERT_TRUE(WriteFileAtomically((*folder)->MeshPath(), "ply").ok());
+  ASSERT_TRUE((*folder)->Remove().ok());
+  EXPECT_FALSE(fs::exists(path_));
+}
+
 TEST_F(WorkFolderTest, ASecondProcessIsKeptOut) {
   auto first = Open('a', "{}");
   ASSERT_TRUE(first.ok());

@@ -7,7 +7,6 @@
 
 #include "pipeline/texturing/seams.h"
 
-#include "common/base/thread_pool.h"
 #include "common/mesh/triangle_mesh.h"
 
 namespace meshwright {
@@ -33,8 +32,9 @@ class VertexOffsets {
 };
 
 // Offsets that make photographs agree along seams and change slowly within charts: least squares after Lempitsky and
-// Ivanov (2007), as in section 4.3 of Waechter et al. 2014, by conjugate gradients, in grey levels.
-void LevelSeams(const TriangleMesh& mesh, const std::vector<int32_t>& labels, const Seams& seams, ThreadPool& pool,
+// Ivanov (2007), as in section 4.3 of Waechter et al. 2014, in grey levels. By Cholesky
+// factors, for which some kB for each face of the mesh are taken meanwhile.
+void LevelSeams(const TriangleMesh& mesh, const std::vector<int32_t>& labels, const Seams& seams,
                 VertexOffsets& offsets);
 
 // Mean difference across seams, grey levels (mean of the channels), with and without offsets.

@@ -93,7 +93,7 @@ class Texturing {
       }
       Tell();
     }
-    if (options_.adjust_colors) LevelSeams(mesh_, labels_, *seams_, pool_, *offsets_);
+    if (options_.adjust_colors) LevelSeams(mesh_, labels_, *seams_, *offsets_);
     const SeamJumps jumps = MeasureJumps(*seams_, *offsets_);
     report_.seam_jump_photographs = jumps.as_photographed;
     report_.seam_jump_leveled = jumps.leveled;
