@@ -10,12 +10,13 @@
 
 namespace meshwright {
 
-// Of every command that talks to a coordinator: --coordinator, MESHWRIGHT_COORDINATOR.
+// Of every command that talks to a coordinator: --coordinator and --grpc-token-file, also from the environment.
 struct ServiceArguments {
   std::string coordinator = "127.0.0.1:7420";
+  std::string token;
   OutputSettings output;
 
-  std::unique_ptr<ServiceClient> Connect() const { return ServiceClient::Connect(coordinator); }
+  std::unique_ptr<ServiceClient> Connect() const { return ServiceClient::Connect(coordinator, token); }
 };
 void AddServiceOptions(CLI::App& command, ServiceArguments& arguments);
 

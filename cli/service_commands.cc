@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/mesh_output.h"
 #include "cli/service_arguments.h"
+#include "common/base/token_file.h"
 #include "common/mesh/formats/mesh_format.h"
 
 namespace meshwright {
@@ -140,6 +141,16 @@ void AddServiceOptions(CLI::App& command, ServiceArguments& arguments) {
   command.add_option("--coordinator", arguments.coordinator, "its host:port")
       ->envname("MESHWRIGHT_COORDINATOR")
       ->capture_default_str();
+  command
+      .add_option_function<std::string>(
+          "--grpc-token-file",
+          [&arguments](const std::string& path) {
+            const auto token = ReadTokenFile(path, "--grpc-token-file");
+            if (!token.ok()) throw CLI::ValidationError(std::string(token.status().message()));
+            arguments.token = *token;
+          },
+          "file with the token that it asks for [none]")
+      ->envname("MESHWRIGHT_GRPC_TOKEN_FILE");
   AddOutputOptions(command, arguments.output);
 }
 

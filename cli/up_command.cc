@@ -50,6 +50,7 @@ int Up(Arguments& arguments) {
   std::vector<std::thread> threads;
   for (int i = 0; i < arguments.workers; ++i) {
     auto worker = WorkerProgram::Make({.coordinator = OwnAddress(settings.listen, (*coordinator)->port()),
+                                       .grpc_token_file = settings.grpc_token_file,
                                        .id = absl::StrCat("local-", i + 1),
                                        .blobs = settings.blobs,
                                        .cores = std::max(1, AvailableCores() / arguments.workers),
@@ -81,8 +82,11 @@ void AddUpCommand(CLI::App& program, Run& run) {
   CLI::App& command = *program.add_subcommand("up", "Run a coordinator and workers on this machine");
   command.footer(kExamples);
   CoordinatorSettings& settings = arguments->coordinator;
-  NameInEnvironment(command.add_option("--listen", settings.listen, "host:port; there is no authentication yet")
-                        ->capture_default_str());
+  NameInEnvironment(
+      command.add_option("--listen", settings.listen, "host:port; without --grpc-token-file everybody may call")
+          ->capture_default_str());
+  NameInEnvironment(command.add_option("--grpc-token-file", settings.grpc_token_file,
+                                       "file with the token that callers over gRPC have to show [none is asked for]"));
   NameInEnvironment(
       command.add_option("--data", settings.data_folder, "folder for everything that is kept")->capture_default_str());
   NameInEnvironment(

@@ -29,8 +29,8 @@ absl::Status FromGrpc(const grpc::Status& status) {
 
 class RealServiceClient final : public ServiceClient {
  public:
-  explicit RealServiceClient(const std::shared_ptr<grpc::Channel>& channel)
-      : stub_(v1::ReconstructionService::NewStub(channel)) {}
+  RealServiceClient(const std::shared_ptr<grpc::Channel>& channel, const std::string& token)
+      : stub_(v1::ReconstructionService::NewStub(channel)), token_(token) {}
 
   absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request) override {
     v1::CreateReconstructionResponse response;
@@ -41,6 +41,7 @@ class RealServiceClient final : public ServiceClient {
   absl::Status Upload(const std::string& id, const std::string& path, const std::string& local_path) override {
     MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(local_path));
     grpc::ClientContext context;
+    ShowToken(context);
     v1::UploadSceneFileResponse response;
     const auto writer = stub_->UploadSceneFile(&context, &response);
     v1::UploadSceneFileRequest request;
@@ -83,6 +84,7 @@ class RealServiceClient final : public ServiceClient {
 
   absl::Status Watch(const std::string& id, const std::function<void(const v1::Reconstruction&)>& changed) override {
     grpc::ClientContext context;
+    ShowToken(context);
     v1::WatchReconstructionRequest request;
     request.set_id(id);
     const auto reader = stub_->WatchReconstruction(&context, request);
@@ -110,6 +112,7 @@ class RealServiceClient final : public ServiceClient {
     MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, Get(id));
     MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
     grpc::ClientContext context;
+    ShowToken(context);
     v1::DownloadMeshRequest request;
     request.set_id(id);
     const auto reader = stub_->DownloadMesh(&context, request);
@@ -143,6 +146,7 @@ class RealServiceClient final : public ServiceClient {
 
   absl::StatusOr<std::string> DownloadPart(const std::string& id, const v1::Part& part) override {
     grpc::ClientContext context;
+    ShowToken(context);
     v1::DownloadPartRequest request;
     request.set_id(id);
     request.set_sequence(part.sequence());
@@ -165,25 +169,30 @@ class RealServiceClient final : public ServiceClient {
   }
 
  private:
+  void ShowToken(grpc::ClientContext& context) const {
+    if (!token_.empty()) context.AddMetadata("authorization", absl::StrCat("Bearer ", token_));
+  }
   template <typename Request, typename Response>
   absl::Status Call(grpc::Status (v1::ReconstructionService::Stub::*method)(grpc::ClientContext*, const Request&,
                                                                             Response*),
                     const Request& request, Response& response) {
     grpc::ClientContext context;
+    ShowToken(context);
     context.set_deadline(std::chrono::system_clock::now() + kCallDeadline);
     return FromGrpc((stub_.get()->*method)(&context, request, &response));
   }
 
   const std::unique_ptr<v1::ReconstructionService::Stub> stub_;
+  const std::string token_;
 };
 
 }  // namespace
 
-std::unique_ptr<ServiceClient> ServiceClient::Connect(const std::string& address) {
+std::unique_ptr<ServiceClient> ServiceClient::Connect(const std::string& address, const std::string& token) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
   return std::make_unique<RealServiceClient>(
-      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments), token);
 }
 
 }  // namespace meshwright

@@ -15,7 +15,8 @@ namespace meshwright {
 // reached.
 class ServiceClient {
  public:
-  static std::unique_ptr<ServiceClient> Connect(const std::string& address);
+  // `token`: what the coordinator asks for; "": nothing.
+  static std::unique_ptr<ServiceClient> Connect(const std::string& address, const std::string& token = "");
   virtual ~ServiceClient() = default;
 
   virtual absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request) = 0;

@@ -15,6 +15,7 @@
 #include "meshwright/v1/reconstruction.grpc.pb.h"
 #include "meshwright/v1/worker.grpc.pb.h"
 
+#include "common/base/digest.h"
 #include "common/base/mutex.h"
 #include "common/base/status_macros.h"
 #include "common/blob/staged_blob.h"
@@ -61,77 +62,115 @@ absl::Status SendFile(const std::string& path, int64_t offset, grpc::ServerWrite
   return std::ferror(file.get()) != 0 ? absl::DataLossError("the mesh's file cannot be read") : absl::OkStatus();
 }
 
+// Who may call.
+class Guard {
+ public:
+  // "": everybody.
+  explicit Guard(const std::string& token) : is_open_(token.empty()), digest_(Sha256Hex("Bearer " + token)) {}
+
+  // Digests are compared, so that the time it takes says nothing of the token.
+  bool Admits(const grpc::ServerContextBase& context) const {
+    if (is_open_) return true;
+    const auto found = context.client_metadata().find("authorization");
+    return found != context.client_metadata().end() &&
+           Sha256Hex(std::string(found->second.data(), found->second.size())) == digest_;
+  }
+
+ private:
+  const bool is_open_;
+  const std::string digest_;
+};
+
+grpc::Status Refused() {
+  return {grpc::StatusCode::UNAUTHENTICATED, "the token is not the one expected (--grpc-token-file)"};
+}
+
 class ReconstructionServiceImpl final : public v1::ReconstructionService::Service {
  public:
-  ReconstructionServiceImpl(ReconstructionService& service, WorkerService& workers)
-      : service_(service), workers_(workers) {}
+  ReconstructionServiceImpl(const Guard& guard, ReconstructionService& service, WorkerService& workers)
+      : guard_(guard), service_(service), workers_(workers) {}
 
-  grpc::Status CreateReconstruction(grpc::ServerContext*, const v1::CreateReconstructionRequest* request,
+  grpc::Status CreateReconstruction(grpc::ServerContext* context, const v1::CreateReconstructionRequest* request,
                                     v1::CreateReconstructionResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(service_.Create(*request), [&](const auto& value) { *response->mutable_reconstruction() = value; });
   }
-  grpc::Status UploadSceneFile(grpc::ServerContext*, grpc::ServerReader<v1::UploadSceneFileRequest>* reader,
+  grpc::Status UploadSceneFile(grpc::ServerContext* context, grpc::ServerReader<v1::UploadSceneFileRequest>* reader,
                                v1::UploadSceneFileResponse*) override {
+    if (!guard_.Admits(*context)) return Refused();
     return ToGrpc(Upload(*reader));
   }
-  grpc::Status StartReconstruction(grpc::ServerContext*, const v1::StartReconstructionRequest* request,
+  grpc::Status StartReconstruction(grpc::ServerContext* context, const v1::StartReconstructionRequest* request,
                                    v1::StartReconstructionResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(service_.Start(request->id()),
                   [&](const auto& value) { *response->mutable_reconstruction() = value; });
   }
-  grpc::Status GetReconstruction(grpc::ServerContext*, const v1::GetReconstructionRequest* request,
+  grpc::Status GetReconstruction(grpc::ServerContext* context, const v1::GetReconstructionRequest* request,
                                  v1::GetReconstructionResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(service_.Get(request->id()), [&](const auto& value) { *response->mutable_reconstruction() = value; });
   }
-  grpc::Status ListReconstructions(grpc::ServerContext*, const v1::ListReconstructionsRequest* request,
+  grpc::Status ListReconstructions(grpc::ServerContext* context, const v1::ListReconstructionsRequest* request,
                                    v1::ListReconstructionsResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(service_.List(*request), [&](const auto& value) { *response = value; });
   }
   grpc::Status WatchReconstruction(grpc::ServerContext* context, const v1::WatchReconstructionRequest* request,
                                    grpc::ServerWriter<v1::WatchReconstructionResponse>* writer) override {
+    if (!guard_.Admits(*context)) return Refused();
     return ToGrpc(service_.Watch(request->id(), [&](const v1::Reconstruction& reconstruction) {
       v1::WatchReconstructionResponse response;
       *response.mutable_reconstruction() = reconstruction;
       return !context->IsCancelled() && writer->Write(response);
     }));
   }
-  grpc::Status CancelReconstruction(grpc::ServerContext*, const v1::CancelReconstructionRequest* request,
+  grpc::Status CancelReconstruction(grpc::ServerContext* context, const v1::CancelReconstructionRequest* request,
                                     v1::CancelReconstructionResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(service_.Cancel(request->id()),
                   [&](const auto& value) { *response->mutable_reconstruction() = value; });
   }
-  grpc::Status DeleteReconstruction(grpc::ServerContext*, const v1::DeleteReconstructionRequest* request,
+  grpc::Status DeleteReconstruction(grpc::ServerContext* context, const v1::DeleteReconstructionRequest* request,
                                     v1::DeleteReconstructionResponse*) override {
+    if (!guard_.Admits(*context)) return Refused();
     return ToGrpc(service_.Delete(request->id()));
   }
-  grpc::Status ListCameras(grpc::ServerContext*, const v1::ListCamerasRequest* request,
+  grpc::Status ListCameras(grpc::ServerContext* context, const v1::ListCamerasRequest* request,
                            v1::ListCamerasResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(service_.ListCameras(request->id()), [&](const auto& value) { *response = value; });
   }
-  grpc::Status GetIncidence(grpc::ServerContext*, const v1::GetIncidenceRequest* request,
+  grpc::Status GetIncidence(grpc::ServerContext* context, const v1::GetIncidenceRequest* request,
                             v1::GetIncidenceResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(service_.GetIncidence(request->id()), [&](const auto& value) { *response = value; });
   }
-  grpc::Status ListParts(grpc::ServerContext*, const v1::ListPartsRequest* request,
+  grpc::Status ListParts(grpc::ServerContext* context, const v1::ListPartsRequest* request,
                          v1::ListPartsResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(service_.ListParts(request->id(), request->after()), [&](const auto& value) { *response = value; });
   }
-  grpc::Status DownloadMesh(grpc::ServerContext*, const v1::DownloadMeshRequest* request,
+  grpc::Status DownloadMesh(grpc::ServerContext* context, const v1::DownloadMeshRequest* request,
                             grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {
+    if (!guard_.Admits(*context)) return Refused();
     const absl::StatusOr<std::string> path = service_.MeshPath(request->id());
     return ToGrpc(path.ok() ? SendFile(*path, request->offset_bytes(), *writer) : path.status());
   }
-  grpc::Status DownloadPart(grpc::ServerContext*, const v1::DownloadPartRequest* request,
+  grpc::Status DownloadPart(grpc::ServerContext* context, const v1::DownloadPartRequest* request,
                             grpc::ServerWriter<v1::DownloadPartResponse>* writer) override {
+    if (!guard_.Admits(*context)) return Refused();
     const absl::StatusOr<std::string> bytes = service_.PartBytes(request->id(), request->sequence());
     return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
   }
-  grpc::Status ListAttempts(grpc::ServerContext*, const v1::ListAttemptsRequest* request,
+  grpc::Status ListAttempts(grpc::ServerContext* context, const v1::ListAttemptsRequest* request,
                             v1::ListAttemptsResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(service_.ListAttempts(*request), [&](const auto& value) { *response = value; });
   }
-  grpc::Status ListWorkers(grpc::ServerContext*, const v1::ListWorkersRequest*,
+  grpc::Status ListWorkers(grpc::ServerContext* context, const v1::ListWorkersRequest*,
                            v1::ListWorkersResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     *response = workers_.ListWorkers();
     return grpc::Status::OK;
   }
@@ -150,6 +189,7 @@ class ReconstructionServiceImpl final : public v1::ReconstructionService::Servic
     return upload.Finish();
   }
 
+  const Guard& guard_;
   ReconstructionService& service_;
   WorkerService& workers_;
 };
@@ -193,20 +233,27 @@ class WaitingWorker final : public grpc::ServerUnaryReactor {
 
 class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Synchronize<v1::WorkerService::Service> {
  public:
-  WorkerServiceImpl(WorkerService& service, BlobStore& blobs, std::string staging_folder)
-      : service_(service), blobs_(blobs), staging_folder_(std::move(staging_folder)) {}
+  WorkerServiceImpl(const Guard& guard, WorkerService& service, BlobStore& blobs, std::string staging_folder)
+      : guard_(guard), service_(service), blobs_(blobs), staging_folder_(std::move(staging_folder)) {}
 
-  grpc::ServerUnaryReactor* Synchronize(grpc::CallbackServerContext*, const v1::SynchronizeRequest* request,
+  grpc::ServerUnaryReactor* Synchronize(grpc::CallbackServerContext* context, const v1::SynchronizeRequest* request,
                                         v1::SynchronizeResponse* response) override {
+    if (!guard_.Admits(*context)) {
+      grpc::ServerUnaryReactor* const refusal = context->DefaultReactor();
+      refusal->Finish(Refused());
+      return refusal;
+    }
     return new WaitingWorker(service_, *request, *response);
   }
-  grpc::Status FetchBlob(grpc::ServerContext*, const v1::FetchBlobRequest* request,
+  grpc::Status FetchBlob(grpc::ServerContext* context, const v1::FetchBlobRequest* request,
                          grpc::ServerWriter<v1::FetchBlobResponse>* writer) override {
+    if (!guard_.Admits(*context)) return Refused();
     const absl::StatusOr<std::string> bytes = blobs_.Get(request->digest());
     return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
   }
-  grpc::Status PutBlob(grpc::ServerContext*, grpc::ServerReader<v1::PutBlobRequest>* reader,
+  grpc::Status PutBlob(grpc::ServerContext* context, grpc::ServerReader<v1::PutBlobRequest>* reader,
                        v1::PutBlobResponse* response) override {
+    if (!guard_.Admits(*context)) return Refused();
     return Answer(Put(*reader), [&](const std::string& digest) { response->set_digest(digest); });
   }
 
@@ -237,6 +284,7 @@ class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Syn
     return expected;
   }
 
+  const Guard& guard_;
   WorkerService& service_;
   BlobStore& blobs_;
   const std::string staging_folder_;
@@ -244,11 +292,13 @@ class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Syn
 
 class RealGrpcServer final : public GrpcServer {
  public:
-  RealGrpcServer(ReconstructionService& reconstructions, WorkerService& workers, BlobStore& blobs)
-      : reconstructions_(reconstructions),
+  RealGrpcServer(const std::string& token, ReconstructionService& reconstructions, WorkerService& workers,
+                 BlobStore& blobs)
+      : guard_(token),
+        reconstructions_(reconstructions),
         workers_(workers),
-        reconstruction_service_impl_(reconstructions, workers),
-        worker_service_impl_(workers, blobs, reconstructions.staging_folder()) {}
+        reconstruction_service_impl_(guard_, reconstructions, workers),
+        worker_service_impl_(guard_, workers, blobs, reconstructions.staging_folder()) {}
   ~RealGrpcServer() override { Shutdown(absl::Seconds(1)); }
 
   absl::Status Listen(const std::string& address, GrpcServer::Interceptors interceptors) {
@@ -282,6 +332,7 @@ class RealGrpcServer final : public GrpcServer {
   }
 
  private:
+  const Guard guard_;
   ReconstructionService& reconstructions_;
   WorkerService& workers_;
   ReconstructionServiceImpl reconstruction_service_impl_;
@@ -292,11 +343,11 @@ class RealGrpcServer final : public GrpcServer {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const std::string& address,
+absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const std::string& address, const std::string& token,
                                                               ReconstructionService& reconstructions,
                                                               WorkerService& workers, BlobStore& blobs,
                                                               Interceptors interceptors) {
-  auto server = std::make_unique<RealGrpcServer>(reconstructions, workers, blobs);
+  auto server = std::make_unique<RealGrpcServer>(token, reconstructions, workers, blobs);
   MW_RETURN_IF_ERROR(server->Listen(address, std::move(interceptors)));
   return server;
 }

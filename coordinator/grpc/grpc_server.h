@@ -19,8 +19,9 @@ class GrpcServer {
  public:
   using Interceptors = std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>>;
 
-  // `address`: "host:port"; port 0 takes a free one. All of it outlives the server.
-  static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(const std::string& address,
+  // `address`: "host:port"; port 0 takes a free one. `token`: what every call but those of health and reflection has to
+  // show, as metadata "authorization: Bearer TOKEN"; "": nothing. All of it outlives the server.
+  static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(const std::string& address, const std::string& token,
                                                            ReconstructionService& reconstructions,
                                                            WorkerService& workers, BlobStore& blobs,
                                                            Interceptors interceptors = {});

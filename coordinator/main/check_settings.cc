@@ -2,13 +2,12 @@
 
 #include <filesystem>
 
-#include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
-#include "common/base/files.h"
 #include "common/base/host_port.h"
 #include "common/base/status_macros.h"
+#include "common/base/token_file.h"
 #include "common/blob/open_blob_store.h"
 #include "coordinator/main/open_job_store.h"
 
@@ -16,8 +15,6 @@ namespace meshwright {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr size_t kMinTokenLength = 16;
 
 absl::Status CheckAddress(const std::string& text, const char* flag, bool is_optional) {
   if (text.empty() && is_optional) return absl::OkStatus();
@@ -46,17 +43,6 @@ absl::Status CheckPage(const std::string& folder) {
 
 }  // namespace
 
-absl::StatusOr<std::string> ReadApiToken(const std::string& path) {
-  if (path.empty()) return std::string();
-  MW_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
-  std::string token(absl::StripAsciiWhitespace(text));
-  if (token.size() < kMinTokenLength) {
-    return absl::InvalidArgumentError(absl::StrCat("--api-token-file is ", path, ", whose token has ", token.size(),
-                                                   " characters, expected at least ", kMinTokenLength));
-  }
-  return token;
-}
-
 absl::Status CheckSettings(const CoordinatorSettings& settings) {
   if (settings.data_folder.empty()) return absl::InvalidArgumentError("--data is required");
   MW_RETURN_IF_ERROR(CheckAddress(settings.listen, "--listen", /*is_optional=*/false));
@@ -69,7 +55,8 @@ absl::Status CheckSettings(const CoordinatorSettings& settings) {
   if (settings.rest_tls_certificate_file.empty() != settings.rest_tls_key_file.empty()) {
     return absl::InvalidArgumentError("--rest-tls-cert and --rest-tls-key: expected both or none");
   }
-  return ReadApiToken(settings.api_token_file).status();
+  MW_RETURN_IF_ERROR(ReadTokenFile(settings.grpc_token_file, "--grpc-token-file").status());
+  return ReadTokenFile(settings.api_token_file, "--api-token-file").status();
 }
 
 }  // namespace meshwright

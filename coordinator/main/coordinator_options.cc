@@ -28,9 +28,13 @@ void AddRestOptions(CLI::App& program, CoordinatorSettings& settings) {
 void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings) {
   NameInEnvironment(program
                         .add_option("--listen", settings.listen,
-                                    "host:port for workers and clients; port 0 takes a free one. There is no "
-                                    "authentication yet: only listen where everybody is trusted")
+                                    "host:port for workers and clients; port 0 takes a free one. Without "
+                                    "--grpc-token-file only listen where everybody is trusted")
                         ->capture_default_str());
+  NameInEnvironment(
+      program.add_option("--grpc-token-file", settings.grpc_token_file,
+                         "file with the token that workers and callers over gRPC have to show [none is asked "
+                         "for]"));
   NameInEnvironment(program.add_option("--data", settings.data_folder, "folder for state, uploads and meshes"));
   NameInEnvironment(program.add_option(
       "--store", settings.store, "sqlite:PATH or postgresql://USER@HOST:PORT/DATABASE [sqlite in the data folder]"));

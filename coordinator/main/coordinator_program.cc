@@ -14,6 +14,7 @@
 #include "common/base/folder_lock.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
+#include "common/base/token_file.h"
 #include "common/blob/blob_store.h"
 #include "common/blob/open_blob_store.h"
 #include "common/telemetry/log.h"
@@ -102,8 +103,9 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
                                                     environment, *workers_));
     GrpcServer::Interceptors interceptors;
     interceptors.push_back(MakeRpcMetrics(metrics_));
-    MW_ASSIGN_OR_RETURN(
-        server_, GrpcServer::Start(settings_.listen, *reconstructions_, *workers_, *blobs_, std::move(interceptors)));
+    MW_ASSIGN_OR_RETURN(const std::string token, ReadTokenFile(settings_.grpc_token_file, "--grpc-token-file"));
+    MW_ASSIGN_OR_RETURN(server_, GrpcServer::Start(settings_.listen, token, *reconstructions_, *workers_, *blobs_,
+                                                   std::move(interceptors)));
     MW_ASSIGN_OR_RETURN(rest_server_, OpenRest(settings_, *reconstructions_, *workers_, *blobs_, *store_, log_));
     MW_RETURN_IF_ERROR(ServeMetrics());
     return absl::OkStatus();

@@ -23,6 +23,7 @@ struct CoordinatorSettings {
   std::string rest_tls_key_file;             // PEM
   std::vector<std::string> trusted_proxies;  // addresses whose X-Forwarded-For is believed
   std::string page_folder;                   // the dashboard's files; "": where they are installed, if they are
+  std::string grpc_token_file;               // what workers and callers over gRPC have to show is in it; "": nothing
   std::string api_token_file;                // what callers over HTTP have to show is in it; "": nothing
   std::string metrics_listen;  // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
 };

@@ -6,7 +6,7 @@
 #include "pipeline/options/options_json.h"
 
 #include "common/base/status_macros.h"
-#include "coordinator/main/check_settings.h"
+#include "common/base/token_file.h"
 
 namespace meshwright {
 namespace {
@@ -37,7 +37,7 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
   options.tls_key_file = settings.rest_tls_key_file;
   options.trusted_proxies = {settings.trusted_proxies.begin(), settings.trusted_proxies.end()};
   options.warn = [&log](const std::string& text) { log.Warning(text); };
-  MW_ASSIGN_OR_RETURN(options.token, ReadApiToken(settings.api_token_file));
+  MW_ASSIGN_OR_RETURN(options.token, ReadTokenFile(settings.api_token_file, "--api-token-file"));
   RestServices services = {.reconstructions = &reconstructions,
                            .workers = &workers,
                            .blobs = &blobs,

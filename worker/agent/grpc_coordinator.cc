@@ -28,11 +28,12 @@ absl::Status FromGrpc(const grpc::Status& status) {
 
 class RealGrpcCoordinator final : public GrpcCoordinator {
  public:
-  explicit RealGrpcCoordinator(const std::shared_ptr<grpc::Channel>& channel)
-      : stub_(v1::WorkerService::NewStub(channel)) {}
+  RealGrpcCoordinator(const std::shared_ptr<grpc::Channel>& channel, const std::string& token)
+      : stub_(v1::WorkerService::NewStub(channel)), token_(token) {}
 
   absl::StatusOr<v1::SynchronizeResponse> Synchronize(const v1::SynchronizeRequest& request) override {
     grpc::ClientContext context;
+    ShowToken(context);
     context.set_deadline(
         std::chrono::system_clock::now() +
         std::chrono::milliseconds(static_cast<int64_t>(1000 * (request.wait_timeout_seconds() + kAnswerSeconds))));
@@ -62,6 +63,7 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
 
   absl::StatusOr<std::string> Put(const std::string& bytes) override {
     grpc::ClientContext context;
+    ShowToken(context);
     context.set_deadline(std::chrono::system_clock::now() + kBlobDeadline);
     v1::PutBlobResponse response;
     const auto writer = stub_->PutBlob(&context, &response);
@@ -80,6 +82,7 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
   absl::StatusOr<std::string> Get(const std::string& digest) override {
     MW_RETURN_IF_ERROR(ValidateDigest(digest));
     grpc::ClientContext context;
+    ShowToken(context);
     context.set_deadline(std::chrono::system_clock::now() + kBlobDeadline);
     v1::FetchBlobRequest request;
     request.set_digest(digest);
@@ -102,7 +105,12 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
   }
 
  private:
+  void ShowToken(grpc::ClientContext& context) const {
+    if (!token_.empty()) context.AddMetadata("authorization", absl::StrCat("Bearer ", token_));
+  }
+
   const std::unique_ptr<v1::WorkerService::Stub> stub_;
+  const std::string token_;
   Mutex mutex_;
   grpc::ClientContext* waiting_ ABSL_GUARDED_BY(mutex_) = nullptr;
   bool interrupted_ ABSL_GUARDED_BY(mutex_) = false;
@@ -110,7 +118,7 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
 
 }  // namespace
 
-std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& address) {
+std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& address, const std::string& token) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10'000);
@@ -118,7 +126,7 @@ std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& add
   // A coordinator that was started anew is found within seconds.
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2'000);
   return std::make_unique<RealGrpcCoordinator>(
-      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments), token);
 }
 
 }  // namespace meshwright

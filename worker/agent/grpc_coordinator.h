@@ -13,7 +13,8 @@ namespace meshwright {
 // first, and again whenever the connection breaks.
 class GrpcCoordinator : public WorkerChannel, public BlobStore {
  public:
-  static std::unique_ptr<GrpcCoordinator> Connect(const std::string& address);
+  // `token`: what the coordinator asks for; "": nothing.
+  static std::unique_ptr<GrpcCoordinator> Connect(const std::string& address, const std::string& token = "");
 };
 
 }  // namespace meshwright

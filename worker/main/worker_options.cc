@@ -6,6 +6,8 @@ namespace meshwright {
 
 void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {
   NameInEnvironment(program.add_option("--coordinator", settings.coordinator, "its host:port")->capture_default_str());
+  NameInEnvironment(program.add_option("--grpc-token-file", settings.grpc_token_file,
+                                       "file with the token that the coordinator asks for [none]"));
   NameInEnvironment(program.add_option("--worker-id", settings.id, "unique [host name and process]"));
   NameInEnvironment(program.add_option(
       "--blobs", settings.blobs,

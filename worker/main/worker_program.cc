@@ -10,6 +10,7 @@
 #include "common/base/clock.h"
 #include "common/base/host_port.h"
 #include "common/base/status_macros.h"
+#include "common/base/token_file.h"
 #include "common/blob/open_blob_store.h"
 #include "common/telemetry/log.h"
 #include "common/telemetry/measured_blob_store.h"
@@ -90,6 +91,7 @@ absl::Status WorkerProgram::Check(const WorkerSettings& settings) {
   if (!settings.metrics_listen.empty()) {
     MW_RETURN_IF_ERROR(ParseHostPort(settings.metrics_listen, "--metrics-listen").status());
   }
+  MW_RETURN_IF_ERROR(ReadTokenFile(settings.grpc_token_file, "--grpc-token-file").status());
   const bool is_folder = !absl::StrContains(settings.blobs, "://");
   if (is_folder || ParseS3Url(settings.blobs).ok()) return absl::OkStatus();
   return absl::InvalidArgumentError(
@@ -102,7 +104,8 @@ absl::StatusOr<std::unique_ptr<WorkerProgram>> WorkerProgram::Make(const WorkerS
   if (!settings.blobs.empty()) {
     MW_ASSIGN_OR_RETURN(shared_blobs, OpenBlobStore(settings.blobs));
   }
-  auto program = std::make_unique<RealWorkerProgram>(settings, GrpcCoordinator::Connect(settings.coordinator),
+  MW_ASSIGN_OR_RETURN(const std::string token, ReadTokenFile(settings.grpc_token_file, "--grpc-token-file"));
+  auto program = std::make_unique<RealWorkerProgram>(settings, GrpcCoordinator::Connect(settings.coordinator, token),
                                                      std::move(shared_blobs));
   if (!settings.metrics_listen.empty()) MW_RETURN_IF_ERROR(program->ServeMetrics(settings.metrics_listen));
   return program;

@@ -9,6 +9,7 @@ namespace meshwright {
 
 struct WorkerSettings {
   std::string coordinator = "127.0.0.1:7420";  // host:port
+  std::string grpc_token_file;                 // the coordinator's; "": none
   std::string id;                              // "": host name and process
   std::string blobs;                           // the coordinator's, as for OpenBlobStore; "": through the coordinator
   int cores = 1;
