@@ -7,6 +7,7 @@
 #include <sqlite3.h>
 
 #include "common/base/check.h"
+#include "common/base/network_file_system.h"
 #include "common/base/status_macros.h"
 #include "coordinator/store/sql_database.h"
 
@@ -124,8 +125,10 @@ absl::StatusOr<SqliteConnection> SqliteConnection::Open(const std::string& path)
   MW_RETURN_IF_ERROR(database.Execute("PRAGMA foreign_keys = OFF; PRAGMA synchronous = FULL;"));
   MW_RETURN_IF_ERROR(database.Migrate());
   MW_RETURN_IF_ERROR(database.Execute("PRAGMA foreign_keys = ON;"));
-  // Some filesystems (network shares) cannot hold a write-ahead log; the classic journal is as safe, only slower.
-  MW_RETURN_IF_ERROR(database.Execute("PRAGMA journal_mode = WAL;"));
+  // A write-ahead log needs memory that its processes share, which machines on a network share do not: one that takes
+  // the file over from another would not see all of it. The classic journal is as safe, only slower.
+  const char* journal = IsOnNetworkFileSystem(path) ? "DELETE" : "WAL";
+  MW_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA journal_mode = ", journal, ";")));
   return database;
 }
 
