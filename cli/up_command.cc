@@ -63,6 +63,7 @@ int Up(Arguments& arguments) {
   if (const int port = (*coordinator)->rest_port(); port > 0) {
     std::printf("the dashboard is at http://127.0.0.1:%d/\n", port);
   }
+  if (const int port = (*coordinator)->nodeodm_port(); port > 0) std::printf("NodeODM on port %d\n", port);
   std::fflush(stdout);
   WaitForStopSignal();
   // Jobs that run are lost; whoever starts this again goes on from the last commit.

@@ -252,6 +252,21 @@ absl::Status ReconstructionService::CheckTakesFiles(const std::string& id) const
       absl::StrCat("reconstruction ", stored.id, " has a scene_reference; nothing is uploaded to it"));
 }
 
+absl::StatusOr<v1::Reconstruction> ReconstructionService::CreateAgain(const std::string& source,
+                                                                      v1::CreateReconstructionRequest request) {
+  MW_ASSIGN_OR_RETURN(const Reconstruction from, Find(source));
+  request.set_scene_reference(from.scene_reference);
+  MW_ASSIGN_OR_RETURN(v1::Reconstruction created, Create(request));
+  if (created.state() != v1::RECONSTRUCTION_STATE_CREATED) return created;
+  MW_ASSIGN_OR_RETURN(const std::vector<SceneFile> files, environment_.store->ListSceneFiles(source));
+  ReferencedBlobs blobs(created.id(), *environment_.store, *environment_.blobs);
+  for (const SceneFile& file : files) {
+    MW_RETURN_IF_ERROR(blobs.Hold(file.digest));
+    MW_RETURN_IF_ERROR(environment_.store->PutSceneFile(created.id(), file));
+  }
+  return created;
+}
+
 absl::StatusOr<SceneFileUpload> ReconstructionService::BeginUpload(const v1::UploadSceneFileRequest::Header& header) {
   MW_RETURN_IF_ERROR(CheckTakesFiles(header.reconstruction_id()));
   return SceneFileUpload::Begin(

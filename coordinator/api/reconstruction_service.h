@@ -43,6 +43,9 @@ class ReconstructionService {
   ~ReconstructionService();
 
   absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request);
+  // Creates one of the files that were uploaded for `source`, whatever has become of that, or of the same
+  // scene_reference: with other options nothing has to be sent again. Repeating it is harmless.
+  absl::StatusOr<v1::Reconstruction> CreateAgain(const std::string& source, v1::CreateReconstructionRequest request);
   absl::StatusOr<SceneFileUpload> BeginUpload(const v1::UploadSceneFileRequest::Header& header);
   // The same for a file that has come otherwise and lies, synced and with the digest that it should have, in
   // staging_folder(), or elsewhere where it has to be copied. It is gone when this returns OK.

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/check.h"
+#include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/blob/filesystem_blob_store.h"
 #include "common/image/encode.h"
@@ -180,6 +181,39 @@ class ReconstructionServiceTest : public testing::Test {
   std::unique_ptr<WorkerService> workers_;
   std::unique_ptr<ReconstructionService> service_;
 };
+
+// The files of one reconstruction are another's, also when the first one is deleted.
+TEST_F(ReconstructionServiceTest, AgainWithOtherOptionsSendsNothingAgain) {
+  v1::CreateReconstructionRequest request;
+  request.set_id("first");
+  ASSERT_TRUE(service_->Create(request).ok());
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ + "/roots/wall")) {
+    if (!entry.is_regular_file()) continue;
+    const std::string bytes = *ReadFile(entry.path());
+    v1::UploadSceneFileRequest::Header header;
+    header.set_reconstruction_id("first");
+    header.set_path(fs::relative(entry.path(), folder_ + "/roots/wall").string());
+    header.set_size_bytes(static_cast<int64_t>(bytes.size()));
+    header.set_sha256(Sha256Hex(bytes));
+    auto upload = service_->BeginUpload(header);
+    ASSERT_TRUE(upload.ok() && upload->Append(bytes).ok() && upload->Finish().ok());
+  }
+  request.set_id("second");
+  request.set_options_json(R"({"other": 1})");
+  ASSERT_TRUE(service_->CreateAgain("first", request).ok());
+  ASSERT_TRUE(service_->CreateAgain("first", request).ok());
+  EXPECT_EQ(*service_->ListSceneFiles("second"), *service_->ListSceneFiles("first"));
+  EXPECT_EQ(service_->ListSceneFiles("second")->size(), kCameras + 3U);
+  ASSERT_TRUE(service_->Delete("first").ok());
+  ASSERT_TRUE(service_->Start("second").ok());
+  RunWorker("w", 1000, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
+  EXPECT_EQ(WaitFor("second").state(), v1::RECONSTRUCTION_STATE_DONE);
+
+  CreateAndStart("by-reference");
+  request.set_id("third");
+  EXPECT_EQ(service_->CreateAgain("by-reference", request)->scene_reference(), "file:wall");
+  EXPECT_TRUE(absl::IsNotFound(service_->CreateAgain("nowhere", request).status()));
+}
 
 TEST_F(ReconstructionServiceTest, AMeshIsMadeWhoeverFailsNowAndThen) {
   CreateAndStart("quiet");

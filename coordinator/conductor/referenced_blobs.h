@@ -23,10 +23,10 @@ class ReferencedBlobs {
   absl::Status PutFile(const std::string& path, const std::string& digest);
   // See BlobStore::Adopt.
   absl::Status Adopt(const std::string& path, const std::string& digest);
-
- private:
+  // Of a blob that is there already, and another reconstruction's.
   absl::Status Hold(const std::string& digest);
 
+ private:
   const std::string reconstruction_;
   JobStore& store_;
   BlobStore& blobs_;

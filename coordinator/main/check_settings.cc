@@ -47,6 +47,7 @@ absl::Status CheckSettings(const CoordinatorSettings& settings) {
   if (settings.data_folder.empty()) return absl::InvalidArgumentError("--data is required");
   MW_RETURN_IF_ERROR(CheckAddress(settings.listen, "--listen", /*is_optional=*/false));
   MW_RETURN_IF_ERROR(CheckAddress(settings.rest_listen, "--rest-listen", /*is_optional=*/true));
+  MW_RETURN_IF_ERROR(CheckAddress(settings.nodeodm_listen, "--nodeodm-listen", /*is_optional=*/true));
   MW_RETURN_IF_ERROR(CheckAddress(settings.metrics_listen, "--metrics-listen", /*is_optional=*/true));
   if (!settings.store.empty()) MW_RETURN_IF_ERROR(CheckJobStore(settings.store));
   MW_RETURN_IF_ERROR(CheckBlobs(settings.blobs));

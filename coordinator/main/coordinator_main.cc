@@ -18,6 +18,7 @@ int Serve(const meshwright::CoordinatorSettings& settings) {
   if (!program.ok()) return meshwright::Fail(program.status());
   std::printf("listening on port %d\n", (*program)->port());
   if (const int port = (*program)->rest_port(); port > 0) std::printf("HTTP on port %d\n", port);
+  if (const int port = (*program)->nodeodm_port(); port > 0) std::printf("NodeODM on port %d\n", port);
   if (const int port = (*program)->metrics_port(); port > 0) std::printf("metrics on port %d\n", port);
   std::fflush(stdout);
   meshwright::WaitForStopSignal();

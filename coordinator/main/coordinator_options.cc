@@ -19,6 +19,17 @@ void AddRestOptions(CLI::App& program, CoordinatorSettings& settings) {
                                     "addresses of proxies in front, with \",\" between them: callers are told apart by "
                                     "what these say in X-Forwarded-For")
                         ->delimiter(','));
+  NameInEnvironment(
+      program
+          .add_option("--nodeodm-listen", settings.nodeodm_listen,
+                      "host:port for NodeODM's protocol, which WebODM, PyODM, CloudODM and ClusterODM speak; "
+                      "their port is 3000; port 0 takes a free one [none]")
+          ->capture_default_str());
+  NameInEnvironment(program
+                        .add_option("--nodeodm-max-images", settings.nodeodm_max_images,
+                                    "files that a task of NodeODM's protocol may have; 0: any number")
+                        ->check(CLI::Range(0, 10'000'000))
+                        ->capture_default_str());
   NameInEnvironment(program.add_option("--dashboard", settings.page_folder,
                                        "folder with the dashboard's files [where they are installed]"));
   NameInEnvironment(program.add_option("--api-token-file", settings.api_token_file,

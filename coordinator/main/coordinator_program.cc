@@ -26,7 +26,9 @@
 #include "coordinator/grpc/grpc_server.h"
 #include "coordinator/main/check_settings.h"
 #include "coordinator/main/open_job_store.h"
+#include "coordinator/main/open_nodeodm.h"
 #include "coordinator/main/open_rest.h"
+#include "coordinator/nodeodm/nodeodm_server.h"
 #include "coordinator/rest/rest_server.h"
 #include "coordinator/store/job_store.h"
 #include "coordinator/telemetry/cluster_gauges.h"
@@ -107,15 +109,18 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
     MW_ASSIGN_OR_RETURN(server_, GrpcServer::Start(settings_.listen, token, *reconstructions_, *workers_, *blobs_,
                                                    std::move(interceptors)));
     MW_ASSIGN_OR_RETURN(rest_server_, OpenRest(settings_, *reconstructions_, *workers_, *blobs_, *store_, log_));
+    MW_ASSIGN_OR_RETURN(nodeodm_server_, OpenNodeOdm(settings_, *reconstructions_, *workers_, *blobs_, clock_, log_));
     MW_RETURN_IF_ERROR(ServeMetrics());
     return absl::OkStatus();
   }
 
   int port() const override { return server_->port(); }
   int rest_port() const override { return rest_server_ != nullptr ? rest_server_->port() : 0; }
+  int nodeodm_port() const override { return nodeodm_server_ != nullptr ? nodeodm_server_->port() : 0; }
   int metrics_port() const override { return metrics_server_ != nullptr ? metrics_server_->port() : 0; }
 
   void Shutdown(absl::Duration deadline) override {
+    if (nodeodm_server_ != nullptr) nodeodm_server_->Shutdown();
     if (rest_server_ != nullptr) rest_server_->Shutdown();
     if (server_ != nullptr) server_->Shutdown(deadline);
   }
@@ -144,7 +149,8 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
   std::unique_ptr<WorkerService> workers_;
   std::unique_ptr<ReconstructionService> reconstructions_;
   std::unique_ptr<GrpcServer> server_;
-  std::unique_ptr<RestServer> rest_server_;  // null: none
+  std::unique_ptr<RestServer> rest_server_;        // null: none
+  std::unique_ptr<NodeOdmServer> nodeodm_server_;  // null: none
   std::unique_ptr<MetricsServer> metrics_server_;
 };
 

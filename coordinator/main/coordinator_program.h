@@ -23,6 +23,8 @@ struct CoordinatorSettings {
   std::string rest_tls_key_file;             // PEM
   std::vector<std::string> trusted_proxies;  // addresses whose X-Forwarded-For is believed
   std::string page_folder;                   // the dashboard's files; "": where they are installed, if they are
+  std::string nodeodm_listen;                // host:port for NodeODM's protocol; port 0 takes a free one; "": none
+  int nodeodm_max_images = 0;                // of one of its tasks; 0: any number
   std::string grpc_token_file;               // what workers and callers over gRPC have to show is in it; "": nothing
   std::string api_token_file;                // what callers over HTTP have to show is in it; "": nothing
   std::string metrics_listen;  // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
@@ -38,6 +40,7 @@ class CoordinatorProgram {
   virtual ~CoordinatorProgram() = default;
   virtual int port() const = 0;
   virtual int rest_port() const = 0;     // 0: none
+  virtual int nodeodm_port() const = 0;  // 0: none
   virtual int metrics_port() const = 0;  // 0: none
   // Ends calls after `deadline` at the latest. State is safe whenever the process ends.
   virtual void Shutdown(absl::Duration deadline) = 0;
