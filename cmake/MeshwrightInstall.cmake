@@ -5,6 +5,7 @@
 
 install(TARGETS meshwright RUNTIME COMPONENT cli)
 install(TARGETS meshwright-coordinator meshwright-worker RUNTIME COMPONENT server)
+install(PROGRAMS ${PROJECT_SOURCE_DIR}/deploy/slurm/meshwright-slurm DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT server)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/dashboard/dist/ DESTINATION ${CMAKE_INSTALL_DATADIR}/meshwright/dashboard
   COMPONENT dashboard OPTIONAL)
 
