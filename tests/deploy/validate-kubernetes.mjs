@@ -45,7 +45,7 @@ const known = {
   probe: ["failureThreshold", "httpGet", "initialDelaySeconds", "periodSeconds", "timeoutSeconds"],
   deployment: ["replicas", "selector", "strategy", "template"],
   pod: ["automountServiceAccountToken", "containers", "securityContext", "terminationGracePeriodSeconds",
-    "topologySpreadConstraints", "volumes"],
+    "restartPolicy", "topologySpreadConstraints", "volumes"],
 };
 function onlyKnown(object, what, value) {
   for (const field of Object.keys(value ?? {})) {
@@ -54,24 +54,29 @@ function onlyKnown(object, what, value) {
 }
 
 const named = (kind) => new Set(objects.filter((o) => o.kind === kind).map((o) => o.metadata.name));
-const secretsOfTheUser = new Set(["meshwright-postgres", "meshwright-s3"]);
-const podLabels = objects.filter((o) => o.kind === "Deployment").map((o) => o.spec.template.metadata.labels);
+const secretsOfTheUser = new Set(["meshwright-postgres", "meshwright-s3", "meshwright-tls", "meshwright-tokens"]);
+const templateOf = (object) => (object.kind === "CronJob" ? object.spec.jobTemplate.spec.template : object.spec.template);
+const podLabels = objects.filter((o) => ["CronJob", "Deployment"].includes(o.kind)).map((o) => templateOf(o).metadata.labels);
 const selects = (selector) =>
   podLabels.some((labels) => Object.entries(selector ?? {}).every(([key, value]) => labels[key] === value));
 
+function checkProbes(object, container) {
+  const ports = new Set(container.ports.map((port) => port.name));
+  for (const probe of [container.livenessProbe, container.readinessProbe]) {
+    if (!ports.has(probe?.httpGet?.port)) complain(object, `a probe of a port that is not there: ${JSON.stringify(probe)}`);
+  }
+}
+
 function checkContainer(object, container) {
   onlyKnown(object, "container", container);
-  container.ports.forEach((port) => onlyKnown(object, "port", port));
+  container.ports?.forEach((port) => onlyKnown(object, "port", port));
   for (const probe of ["livenessProbe", "readinessProbe", "startupProbe"]) onlyKnown(object, "probe", container[probe]);
   const security = container.securityContext ?? {};
   if (security.readOnlyRootFilesystem !== true) complain(object, "its root file system can be written");
   if (security.allowPrivilegeEscalation !== false) complain(object, "it may get more rights");
   if (!security.capabilities?.drop?.includes("ALL")) complain(object, "it keeps capabilities");
   if (!container.resources?.requests?.memory || !container.resources?.limits?.memory) complain(object, "no memory said");
-  const ports = new Set(container.ports.map((port) => port.name));
-  for (const probe of [container.livenessProbe, container.readinessProbe]) {
-    if (!ports.has(probe?.httpGet?.port)) complain(object, `a probe of a port that is not there: ${JSON.stringify(probe)}`);
-  }
+  if (object.kind === "Deployment") checkProbes(object, container);
   for (const entry of container.env ?? []) {
     onlyKnown(object, "env", entry);
     const secret = entry.valueFrom?.secretKeyRef;
@@ -86,13 +91,10 @@ function checkContainer(object, container) {
   if (!/:[^:]+$/.test(container.image) || container.image.endsWith(":latest")) complain(object, "its image has no version");
 }
 
-function checkDeployment(object) {
-  const pod = object.spec.template.spec;
-  onlyKnown(object, "deployment", object.spec);
+function checkPod(object, pod) {
   onlyKnown(object, "pod", pod);
   if (pod.securityContext?.runAsNonRoot !== true) complain(object, "it may run as root");
   if (pod.automountServiceAccountToken !== false) complain(object, "it gets a token that it does not need");
-  if (!selects(object.spec.selector.matchLabels)) complain(object, "its selector selects nothing");
   pod.containers.forEach((container) => checkContainer(object, container));
   const volumes = new Set(pod.volumes.map((volume) => volume.name));
   for (const mount of pod.containers.flatMap((container) => container.volumeMounts)) {
@@ -101,7 +103,16 @@ function checkDeployment(object) {
   for (const volume of pod.volumes) {
     const claim = volume.persistentVolumeClaim?.claimName;
     if (claim && !named("PersistentVolumeClaim").has(claim)) complain(object, `claim ${claim} is not there`);
+    const secret = volume.secret?.secretName;
+    if (volume.secret && !secretsOfTheUser.has(secret)) complain(object, `secret ${secret} is not documented`);
   }
+}
+
+function checkDeployment(object) {
+  const pod = object.spec.template.spec;
+  onlyKnown(object, "deployment", object.spec);
+  checkPod(object, pod);
+  if (!selects(object.spec.selector.matchLabels)) complain(object, "its selector selects nothing");
   const env = pod.containers.flatMap((container) => container.env ?? []);
   const drain = env.find((entry) => entry.name === "MESHWRIGHT_DRAIN_SECONDS");
   if (drain && pod.terminationGracePeriodSeconds < Number(drain.value) + 15) {
@@ -110,6 +121,22 @@ function checkDeployment(object) {
   if (!objects.some((o) => o.kind === "PodDisruptionBudget" &&
       Object.entries(o.spec.selector.matchLabels).every(([k, v]) => object.spec.template.metadata.labels[k] === v))) {
     complain(object, "no disruption budget");
+  }
+}
+
+function checkIngress(object) {
+  const hosts = new Set(object.spec.tls?.flatMap((tls) => tls.hosts));
+  for (const tls of object.spec.tls ?? []) {
+    if (!secretsOfTheUser.has(tls.secretName)) complain(object, `secret ${tls.secretName} is not documented`);
+  }
+  for (const rule of object.spec.rules) {
+    if (!hosts.has(rule.host)) complain(object, `${rule.host} is served without TLS`);
+    for (const { backend } of rule.http.paths) {
+      const service = objects.find((o) => o.kind === "Service" && o.metadata.name === backend.service.name);
+      if (!service?.spec.ports.some((port) => port.name === backend.service.port.name)) {
+        complain(object, `no service ${backend.service.name} with port ${backend.service.port.name}`);
+      }
+    }
   }
 }
 
@@ -129,6 +156,8 @@ for (const object of objects) {
   validateSchema(object);
   if (object.kind !== "Namespace" && object.metadata?.namespace !== "meshwright") complain(object, "another namespace");
   if (object.kind === "Deployment") checkDeployment(object);
+  if (object.kind === "CronJob") checkPod(object, templateOf(object).spec);
+  if (object.kind === "Ingress") checkIngress(object);
   if (object.kind === "ScaledObject") checkScaling(object);
   if (object.kind === "Service" && !selects(object.spec.selector)) complain(object, "its selector selects nothing");
   if (object.kind === "PodDisruptionBudget" && !selects(object.spec.selector?.matchLabels)) {
