@@ -123,6 +123,7 @@ absl::Status ReconstructionService::OverseeOnce() {
   std::map<std::string, const ConductedState*> by_id;
   for (const ConductedState& state : all) by_id[state.id] = &state;
   std::vector<std::unique_ptr<ReconstructionDriver>> ended;
+  std::vector<std::string> ended_ids;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (auto it = conducted_.begin(); it != conducted_.end();) {
@@ -132,6 +133,7 @@ absl::Status ReconstructionService::OverseeOnce() {
       if (!is_ours) conducted.RequestStop();  // cancelled, or somebody else's now
       if (conducted.has_ended()) {
         ended.push_back(std::move(it->second));
+        ended_ids.push_back(it->first);
         it = conducted_.erase(it);
       } else {
         ++it;
@@ -139,6 +141,7 @@ absl::Status ReconstructionService::OverseeOnce() {
     }
   }
   ended.clear();
+  for (const std::string& id : ended_ids) TellEnd(id);
   for (const ConductedState& state : all) MW_RETURN_IF_ERROR(TakeUp(state, now));
   return absl::OkStatus();
 }
@@ -185,6 +188,11 @@ void ReconstructionService::StopConducting(const std::string& id) {
   }
   workers_.Wake();
   Changed(/*look=*/true);
+}
+
+void ReconstructionService::TellEnd(const std::string& id) {
+  const absl::StatusOr<Reconstruction> stored = Find(id);
+  if (stored.ok() && IsFinal(stored->state)) options_.ended(Describe(*stored));
 }
 
 absl::StatusOr<Reconstruction> ReconstructionService::Find(const std::string& id) const {
@@ -343,7 +351,9 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Cancel(const std::stri
     const absl::Status cancelled = environment_.store->SetReconstructionState(id, ReconstructionState::kCancelled, now);
     // It may have come to its end at the same moment.
     if (!absl::IsFailedPrecondition(cancelled)) MW_RETURN_IF_ERROR(cancelled);
+    const bool was_conducted = stored.state != ReconstructionState::kCreated;
     StopConducting(id);
+    if (!was_conducted) TellEnd(id);
     MW_ASSIGN_OR_RETURN(stored, Find(id));
   }
   return Describe(stored);

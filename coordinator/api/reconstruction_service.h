@@ -29,6 +29,9 @@ struct ReconstructionServiceOptions {
   std::string name = "coordinator";
   // Another coordinator takes over what this one conducts when it has been silent so long.
   absl::Duration conductor_lease = absl::Seconds(5);
+  // Told of each reconstruction that has come to its end here, once; not of one whose end this process did not live to
+  // see. Must not block.
+  std::function<void(const v1::Reconstruction&)> ended = [](const v1::Reconstruction&) {};
 };
 
 // The public interface without a network. All that it knows is in the JobStore and the BlobStore, so any coordinator
@@ -84,6 +87,7 @@ class ReconstructionService {
   v1::Reconstruction Describe(const Reconstruction& reconstruction) const;
   absl::Status CheckTakesFiles(const std::string& id) const;
   void StopConducting(const std::string& id);
+  void TellEnd(const std::string& id);
   void Changed(bool look);
   void Oversee();
   absl::Status OverseeOnce();

@@ -10,6 +10,7 @@
 #include "common/base/token_file.h"
 #include "common/blob/open_blob_store.h"
 #include "coordinator/main/open_job_store.h"
+#include "coordinator/webhook/webhook_sender.h"
 
 namespace meshwright {
 namespace {
@@ -56,6 +57,15 @@ absl::Status CheckSettings(const CoordinatorSettings& settings) {
   if (settings.rest_tls_certificate_file.empty() != settings.rest_tls_key_file.empty()) {
     return absl::InvalidArgumentError("--rest-tls-cert and --rest-tls-key: expected both or none");
   }
+  if (settings.webhook_url.empty() != settings.webhook_secret_file.empty()) {
+    return absl::InvalidArgumentError("--webhook-url and --webhook-secret-file: expected both or none");
+  }
+  if (!settings.webhook_url.empty()) {
+    if (const absl::Status url = WebhookSender::CheckUrl(settings.webhook_url); !url.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat("--webhook-url is ", std::string(url.message())));
+    }
+  }
+  MW_RETURN_IF_ERROR(ReadTokenFile(settings.webhook_secret_file, "--webhook-secret-file").status());
   MW_RETURN_IF_ERROR(ReadTokenFile(settings.grpc_token_file, "--grpc-token-file").status());
   return ReadTokenFile(settings.api_token_file, "--api-token-file").status();
 }

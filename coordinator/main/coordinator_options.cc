@@ -30,6 +30,10 @@ void AddRestOptions(CLI::App& program, CoordinatorSettings& settings) {
                                     "files that a task of NodeODM's protocol may have; 0: any number")
                         ->check(CLI::Range(0, 10'000'000))
                         ->capture_default_str());
+  NameInEnvironment(program.add_option("--webhook-url", settings.webhook_url,
+                                       "address of http or https that is told when a reconstruction is over [none]"));
+  NameInEnvironment(program.add_option("--webhook-secret-file", settings.webhook_secret_file,
+                                       "file with the secret that what is told is signed with"));
   NameInEnvironment(program.add_option("--dashboard", settings.page_folder,
                                        "folder with the dashboard's files [where they are installed]"));
   NameInEnvironment(program.add_option("--api-token-file", settings.api_token_file,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "pipeline/config/parse_config.h"
@@ -21,6 +22,7 @@
 #include "common/telemetry/measured_blob_store.h"
 #include "common/telemetry/metrics.h"
 #include "common/telemetry/metrics_server.h"
+#include "coordinator/api/reconstruction_record.h"
 #include "coordinator/api/reconstruction_service.h"
 #include "coordinator/dispatch/worker_service.h"
 #include "coordinator/grpc/grpc_server.h"
@@ -34,6 +36,7 @@
 #include "coordinator/telemetry/cluster_gauges.h"
 #include "coordinator/telemetry/measured_sql_database.h"
 #include "coordinator/telemetry/rpc_metrics.h"
+#include "coordinator/webhook/webhook_sender.h"
 
 namespace meshwright {
 namespace {
@@ -53,6 +56,20 @@ std::string NameOf(const std::string& data_folder) {
   std::error_code error;
   const fs::path path = fs::canonical(data_folder, error);
   return absl::StrCat(host, ":", error ? data_folder : path.string());
+}
+
+// What the webhook tells: enough for a line in a chat and for a program that fetches the mesh.
+std::string WebhookBody(const v1::Reconstruction& over) {
+  nlohmann::ordered_json body = {{"id", over.id()}, {"state", InWords(over.state())}};
+  if (!over.failure().empty()) body["failure"] = over.failure();
+  body["path"] = absl::StrCat("/v1/reconstructions/", over.id());
+  if (over.state() == v1::RECONSTRUCTION_STATE_DONE) {
+    body["mesh"] = {{"vertices", over.progress().vertices()},
+                    {"faces", over.progress().faces()},
+                    {"bytes", over.mesh_bytes()},
+                    {"sha256", over.mesh_sha256()}};
+  }
+  return body.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 class RealCoordinatorProgram final : public CoordinatorProgram {
@@ -89,6 +106,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
     MW_ASSIGN_OR_RETURN(unmeasured_blobs_,
                         OpenBlobStore(settings_.blobs.empty() ? absl::StrCat(data, "/blobs") : settings_.blobs));
     blobs_ = std::make_unique<MeasuredBlobStore>(*unmeasured_blobs_, metrics_);
+    MW_RETURN_IF_ERROR(OpenWebhook());
     workers_ = std::make_unique<WorkerService>(lease_, retry_, *store_);
     const DriverEnvironment environment = {.store = store_.get(),
                                            .blobs = blobs_.get(),
@@ -97,12 +115,13 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
                                            .jobs_changed = [this] { workers_->Wake(); },
                                            .parse_config = ParseConfig,
                                            .max_failures = retry_.max_failures};
-    MW_ASSIGN_OR_RETURN(reconstructions_,
-                        ReconstructionService::Open({.data_folder = data,
-                                                     .scene_roots = settings_.scene_roots,
-                                                     .name = NameOf(data),
-                                                     .conductor_lease = std::min(lease_.lease, kConductorLease)},
-                                                    environment, *workers_));
+    MW_ASSIGN_OR_RETURN(reconstructions_, ReconstructionService::Open(
+                                              {.data_folder = data,
+                                               .scene_roots = settings_.scene_roots,
+                                               .name = NameOf(data),
+                                               .conductor_lease = std::min(lease_.lease, kConductorLease),
+                                               .ended = [this](const v1::Reconstruction& over) { TellEnd(over); }},
+                                              environment, *workers_));
     GrpcServer::Interceptors interceptors;
     interceptors.push_back(MakeRpcMetrics(metrics_));
     MW_ASSIGN_OR_RETURN(const std::string token, ReadTokenFile(settings_.grpc_token_file, "--grpc-token-file"));
@@ -126,6 +145,19 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
   }
 
  private:
+  absl::Status OpenWebhook() {
+    if (settings_.webhook_url.empty()) return absl::OkStatus();
+    WebhookOptions options = {.url = settings_.webhook_url};
+    MW_ASSIGN_OR_RETURN(options.secret, ReadTokenFile(settings_.webhook_secret_file, "--webhook-secret-file"));
+    options.warn = [this](const std::string& text) { log_.Warning(text); };
+    webhook_ = std::make_unique<WebhookSender>(std::move(options));
+    return absl::OkStatus();
+  }
+
+  void TellEnd(const v1::Reconstruction& over) {
+    if (webhook_ != nullptr) webhook_->Send(WebhookBody(over));
+  }
+
   absl::Status ServeMetrics() {
     if (settings_.metrics_listen.empty()) return absl::OkStatus();
     AddClusterGauges(metrics_, *database_, *workers_, settings_.data_folder);
@@ -146,6 +178,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
   SqlDatabase* database_ = nullptr;  // the store's
   std::unique_ptr<BlobStore> unmeasured_blobs_;
   std::unique_ptr<BlobStore> blobs_;
+  std::unique_ptr<WebhookSender> webhook_;  // null: none
   std::unique_ptr<WorkerService> workers_;
   std::unique_ptr<ReconstructionService> reconstructions_;
   std::unique_ptr<GrpcServer> server_;

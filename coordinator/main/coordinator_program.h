@@ -26,6 +26,8 @@ struct CoordinatorSettings {
   std::string nodeodm_listen;                // host:port for NodeODM's protocol; port 0 takes a free one; "": none
   int nodeodm_max_images = 0;                // of one of its tasks; 0: any number
   std::string grpc_token_file;               // what workers and callers over gRPC have to show is in it; "": nothing
+  std::string webhook_url;                   // where ends of reconstructions are told; "": nowhere
+  std::string webhook_secret_file;           // what that is signed with is in it
   std::string api_token_file;                // what callers over HTTP have to show is in it; "": nothing
   std::string metrics_listen;  // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
 };
