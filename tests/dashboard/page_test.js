@@ -165,6 +165,16 @@ test('a running reconstruction can be cancelled, after a question', async (t) =>
   await page.getByRole('button', { name: 'Cancel it' }).click();
   await page.locator('.badge', { hasText: 'Cancelled' }).waitFor();
   assert.equal(api.simulations.get('second-flight').state, 'CANCELLED');
+
+  // What is over can be removed.
+  await page.getByRole('button', { name: 'Delete', exact: true }).click();
+  assert.deepEqual(await violations(page), []);
+  await page.getByRole('button', { name: 'Keep it' }).click();
+  assert.ok(api.simulations.has('second-flight'));
+  await page.getByRole('button', { name: 'Delete', exact: true }).click();
+  await page.getByRole('button', { name: 'Delete it' }).click();
+  await page.getByRole('heading', { name: 'Reconstructions' }).waitFor();
+  assert.ok(!api.simulations.has('second-flight'));
 });
 
 test('a worker can be drained', async (t) => {

@@ -164,7 +164,7 @@ export function ViewerPanel(props: Props) {
       ? state !== null && isOver(state)
         ? 'Nothing was accepted'
         : 'No surface is accepted yet'
-      : `${count(numbers.faces)} triangles of ${count(numbers.parts)} cameras` +
+      : `Surfaces of ${count(numbers.parts)} cameras, side by side: ${count(numbers.faces)} triangles` +
         (numbers.shown < numbers.faces ? `, ${count(numbers.shown)} shown` : '');
   return (
     <section class="card stage" ref={frame} aria-label="The mesh in 3D">

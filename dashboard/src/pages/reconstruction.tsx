@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { useEffect, useState } from 'preact/hooks';
-import { reconstructionUrl } from '../api/client';
+import { api, reconstructionUrl } from '../api/client';
 import { isOver, stateOf, type Reconstruction } from '../api/types';
 import { IncidenceCard } from '../charts/incidence';
 import { SharesCard } from '../charts/shares';
@@ -54,7 +54,13 @@ function Summary({ store, reconstruction }: { store: ReconstructionStore; recons
           value={filtered > 0 ? percent(Number(progress.patchesAccepted ?? 0) / filtered) : '–'}
           title="Patches that other cameras confirm, of those that filtering left"
         />
-        {Number(progress.faces ?? 0) > 0 && <Fact name="Triangles" value={count(Number(progress.faces))} />}
+        {Number(progress.faces ?? 0) > 0 && (
+          <Fact
+            name="Mesh"
+            value={`${count(Number(progress.faces))} triangles`}
+            title="Of the one mesh that the surfaces were joined into: what overlapped is there once"
+          />
+        )}
         <Fact name={isOver(state) ? 'Took' : 'Running for'} value={duration(Math.max(0, (end - start) / 1000))} />
         {left !== null && <Fact name="Left" value={`about ${duration(left)}`} />}
       </dl>
@@ -78,6 +84,7 @@ export default function ReconstructionPage({ id }: { id: string }) {
   const [store, setStore] = useState<ReconstructionStore | null>(null);
   const [selected, setSelected] = useState(-1);
   const [cancelling, setCancelling] = useState(false);
+  const [deleting, setDeleting] = useState(false);
   const [failure, setFailure] = useState('');
   useEffect(() => {
     const made = new ReconstructionStore(id);
@@ -93,6 +100,17 @@ export default function ReconstructionPage({ id }: { id: string }) {
     try {
       await store.cancel();
       setFailure('');
+    } catch (problem) {
+      setFailure((problem as Error).message);
+    }
+  };
+
+  const deleteAnswered = async (yes: boolean) => {
+    setDeleting(false);
+    if (!yes) return;
+    try {
+      await api.remove(id);
+      location.hash = linkTo.reconstructions;
     } catch (problem) {
       setFailure((problem as Error).message);
     }
@@ -118,6 +136,11 @@ export default function ReconstructionPage({ id }: { id: string }) {
           {state !== null && !isOver(state) && (
             <button class="button danger" onClick={() => setCancelling(true)}>
               Cancel
+            </button>
+          )}
+          {state !== null && isOver(state) && (
+            <button class="button danger" onClick={() => setDeleting(true)}>
+              Delete
             </button>
           )}
         </div>
@@ -146,6 +169,14 @@ export default function ReconstructionPage({ id }: { id: string }) {
           words="What is accepted so far stays and can be downloaded; it cannot be taken up again."
           action="Cancel it"
           onAnswer={(yes) => void cancelAnswered(yes)}
+        />
+      )}
+      {deleting && (
+        <Confirm
+          title={`Delete ${id}?`}
+          words="Its mesh, its surfaces and the photographs that nobody else uses are removed for good."
+          action="Delete it"
+          onAnswer={(yes) => void deleteAnswered(yes)}
         />
       )}
     </>

@@ -17,6 +17,7 @@ import {
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { POSE, type CameraTable } from '../api/camera_table';
 import { CameraFrusta } from './camera_frusta';
+import { commonUp } from './common_up';
 import { PartBuffer, type Coloring } from './part_buffer';
 import type { LoadedPart } from './part_loader';
 import type { PartGeometry } from './preview_decoder';
@@ -64,6 +65,7 @@ export class SceneViewer {
   private growthTimer: ReturnType<typeof setTimeout> | undefined;
   private movedByHand = false;
   private fittedRadius = 0;
+  private fittedSurface = false;
   private pressed: { x: number; y: number } | null = null;
 
   // Throws where there is no WebGL 2.
@@ -136,13 +138,14 @@ export class SceneViewer {
     this.draw();
   }
 
-  // Stands behind the camera and looks where it looks.
+  // Stands behind the camera and looks where it looks, held as it was held.
   lookThrough(camera: number) {
     if (this.table === null || camera < 0) return;
     const pose = this.table.poses.subarray(POSE * camera, POSE * (camera + 1));
     const forward = new Vector3(pose[2], pose[5], pose[8]);
     const center = this.frusta.centerOf(camera);
-    const distance = Math.max(this.boxOfAll().getCenter(new Vector3()).sub(center).dot(forward), this.radius() * 0.2);
+    const distance = Math.max(this.boxToFit().getCenter(new Vector3()).sub(center).dot(forward), this.radius() * 0.2);
+    this.turnUp(new Vector3(-pose[1]!, -pose[4]!, -pose[7]!));
     this.view.position.copy(center).addScaledVector(forward, -0.05 * distance);
     this.controls.target.copy(center).addScaledVector(forward, distance);
     this.movedByHand = true;
@@ -150,13 +153,15 @@ export class SceneViewer {
     this.changed();
   }
 
-  // Everything in view, from where the cameras stand.
+  // The surface in view, upright, from where the cameras stand; the cameras where there is none yet.
   fit() {
-    const box = this.boxOfAll();
+    const box = this.boxToFit();
     if (box.isEmpty()) return;
+    this.turnUp(this.up);
     const center = box.getCenter(new Vector3());
-    const radius = this.radius();
+    const radius = this.radiusToFit();
     this.fittedRadius = radius;
+    this.fittedSurface = !this.partBox.isEmpty();
     const direction = this.standpoint().sub(center);
     if (direction.length() < 0.15 * radius) direction.copy(this.up).addScaledVector(anyNormalTo(this.up), 1.2);
     direction.normalize().addScaledVector(this.up, 0.35).normalize();
@@ -173,12 +178,12 @@ export class SceneViewer {
   orbit(azimuth: number, polar: number, zoom: number) {
     const offset = this.view.position.clone().sub(this.controls.target);
     const toY = new Vector3(0, 1, 0);
-    const turned = offset.clone().applyQuaternion(quaternionBetween(this.up, toY));
+    const turned = offset.clone().applyQuaternion(quaternionBetween(this.view.up, toY));
     const spherical = new Spherical().setFromVector3(turned);
     spherical.theta += azimuth;
     spherical.phi = Math.min(Math.max(spherical.phi + polar, 0.02), Math.PI - 0.02);
     spherical.radius *= zoom;
-    offset.setFromSpherical(spherical).applyQuaternion(quaternionBetween(toY, this.up));
+    offset.setFromSpherical(spherical).applyQuaternion(quaternionBetween(toY, this.view.up));
     this.view.position.copy(this.controls.target).add(offset);
     this.movedByHand = true;
     this.controls.update();
@@ -289,22 +294,28 @@ export class SceneViewer {
     }
     this.queue.splice(0, taken);
     // What grows stays in view until somebody looks elsewhere.
-    if (!this.movedByHand && this.radius() > 1.1 * this.fittedRadius) this.fit();
+    const isOutgrown = this.fittedSurface === this.partBox.isEmpty() || this.radiusToFit() > 1.1 * this.fittedRadius;
+    if (!this.movedByHand && isOutgrown) this.fit();
   }
 
   private takeUpCameras(table: CameraTable) {
     this.cameraBox.makeEmpty();
-    const up = new Vector3();
     for (let i = 0; i < table.count; ++i) {
       const pose = table.poses.subarray(POSE * i, POSE * (i + 1));
       this.cameraBox.expandByPoint(new Vector3(pose[9], pose[10], pose[11]));
-      up.sub(new Vector3(pose[1], pose[4], pose[7])); // Y of a camera points down
     }
-    this.up.copy(up.length() > 0.05 * table.count ? up.normalize() : new Vector3(0, 0, 1));
-    this.view.up.copy(this.up);
-    // They read the up direction once, when they are made.
+    this.up.copy(commonUp(table) ?? new Vector3(0, 0, 1));
+    this.turnUp(this.up);
+  }
+
+  // What is up on the screen. The controls read it once, when they are made.
+  private turnUp(up: Vector3) {
+    if (this.view.up.distanceTo(up) < 1e-9) return;
+    this.view.up.copy(up);
+    const { target } = this.controls;
     this.controls.dispose();
     this.controls = this.makeControls();
+    this.controls.target.copy(target);
   }
 
   // Pyramids as large as the gaps between cameras let them be.
@@ -319,9 +330,16 @@ export class SceneViewer {
     return this.cameraBox.clone().union(this.partBox);
   }
 
+  private boxToFit(): Box3 {
+    return this.partBox.isEmpty() ? this.cameraBox.clone() : this.partBox.clone();
+  }
+
   private radius(): number {
-    const box = this.boxOfAll();
-    return box.isEmpty() ? 1e-6 : Math.max(box.getSize(new Vector3()).length() / 2, 1e-6);
+    return radiusOf(this.boxOfAll());
+  }
+
+  private radiusToFit(): number {
+    return radiusOf(this.boxToFit());
   }
 
   private standpoint(): Vector3 {
@@ -346,6 +364,10 @@ export class SceneViewer {
     this.view.updateProjectionMatrix();
     this.draw();
   }
+}
+
+function radiusOf(box: Box3): number {
+  return box.isEmpty() ? 1e-6 : Math.max(box.getSize(new Vector3()).length() / 2, 1e-6);
 }
 
 function drawsInSoftware(): boolean {

@@ -208,6 +208,10 @@ export class FakeApi {
       if (simulation.state === 'RUNNING') simulation.finish('CANCELLED');
       return json(response, simulation.reconstruction());
     }
+    if (request.method === 'DELETE' && rest.length === 0) {
+      this.simulations.delete(simulation.reconstruction().id);
+      return response.writeHead(204).end();
+    }
     switch (rest[0] ?? '') {
       case '':
         return json(response, simulation.reconstruction());
