@@ -32,6 +32,8 @@ void AddTextureCommand(CLI::App& program, Run& run);
 void AddUpCommand(CLI::App& program, Run& run);
 // status, watch, fetch, cancel, delete, workers.
 void AddServiceCommands(CLI::App& program, Run& run);
+// token create, list, revoke.
+void AddTokenCommand(CLI::App& program, Run& run);
 
 // Options that several commands share.
 struct SceneArguments {

@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
   AddUpCommand(program, run);
   AddSubmitCommand(program, run);
   AddServiceCommands(program, run);
+  AddTokenCommand(program, run);
   if (const auto environment = SettingsOfEnvironment({}); !environment.ok()) {
     return FailWrongUse(std::string(environment.status().message()));
   }

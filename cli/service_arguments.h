@@ -10,13 +10,16 @@
 
 namespace meshwright {
 
-// Of every command that talks to a coordinator: --coordinator and --grpc-token-file, also from the environment.
+// Of every command that talks to a coordinator: --coordinator, --token-file and --ca-file, or MESHWRIGHT_COORDINATOR
+// and so on.
 struct ServiceArguments {
   std::string coordinator = "127.0.0.1:7420";
-  std::string token;
+  std::string token_file;
+  std::string ca_file;
   OutputSettings output;
 
-  std::unique_ptr<ServiceClient> Connect() const { return ServiceClient::Connect(coordinator, token); }
+  // A file that cannot be read is said on stderr; the coordinator then cannot be reached, or does not answer.
+  std::unique_ptr<ServiceClient> Connect() const;
 };
 void AddServiceOptions(CLI::App& command, ServiceArguments& arguments);
 

@@ -12,7 +12,7 @@
 #include "cli/commands.h"
 #include "cli/mesh_output.h"
 #include "cli/service_arguments.h"
-#include "common/base/token_file.h"
+#include "common/base/files.h"
 #include "common/mesh/formats/mesh_format.h"
 
 namespace meshwright {
@@ -120,6 +120,14 @@ int Delete(const Arguments& arguments) {
   return status.ok() ? kExitDone : FailCall(status, arguments.service);
 }
 
+// `unreadable` where the file cannot be read, "" where none is named.
+std::string ReadOrWarn(const std::string& path, const std::string& unreadable) {
+  if (path.empty()) return "";
+  const absl::StatusOr<std::string> text = ReadFile(path);
+  if (!text.ok()) Warn(std::string(text.status().message()));
+  return text.ok() ? std::string(absl::StripAsciiWhitespace(*text)) : unreadable;
+}
+
 // Nobody listens there, as gRPC says it; a coordinator that answers has other words.
 bool IsNobodyThere(const absl::Status& status) {
   const std::string message(status.message());
@@ -129,6 +137,12 @@ bool IsNobodyThere(const absl::Status& status) {
 }
 
 }  // namespace
+
+std::unique_ptr<ServiceClient> ServiceArguments::Connect() const {
+  // Never without TLS where TLS was asked for: nobody is vouched for by what is no certificate.
+  return ServiceClient::Connect(
+      coordinator, {.key = ReadOrWarn(token_file, ""), .ca_certificates = ReadOrWarn(ca_file, "no certificate")});
+}
 
 int FailCall(const absl::Status& status, const ServiceArguments& arguments) {
   if (!IsNobodyThere(status)) return Fail(status);
@@ -141,16 +155,12 @@ void AddServiceOptions(CLI::App& command, ServiceArguments& arguments) {
   command.add_option("--coordinator", arguments.coordinator, "its host:port")
       ->envname("MESHWRIGHT_COORDINATOR")
       ->capture_default_str();
+  command.add_option("--token-file", arguments.token_file, "file with the key to show [none is shown]")
+      ->envname("MESHWRIGHT_TOKEN_FILE");
   command
-      .add_option_function<std::string>(
-          "--grpc-token-file",
-          [&arguments](const std::string& path) {
-            const auto token = ReadTokenFile(path, "--grpc-token-file");
-            if (!token.ok()) throw CLI::ValidationError(std::string(token.status().message()));
-            arguments.token = *token;
-          },
-          "file with the token that it asks for [none]")
-      ->envname("MESHWRIGHT_GRPC_TOKEN_FILE");
+      .add_option("--ca-file", arguments.ca_file,
+                  "file with the certificates of those who may vouch for the coordinator, PEM; turns TLS on [no TLS]")
+      ->envname("MESHWRIGHT_CA_FILE");
   AddOutputOptions(command, arguments.output);
 }
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -11,6 +12,7 @@
 
 #include "cli/commands.h"
 #include "coordinator/main/coordinator_options.h"
+#include "coordinator/main/key_file.h"
 #include "worker/main/worker_program.h"
 
 namespace meshwright {
@@ -18,7 +20,7 @@ namespace {
 
 constexpr char kExamples[] = R"(Examples:
   meshwright up --data service
-  meshwright up --data service --workers 4 --listen 0.0.0.0:7420
+  meshwright up --data service --workers 4 --listen 0.0.0.0:7420 --api-token-file key
 Then, from another terminal: meshwright submit my-scene -o mesh.ply
 More workers may join from other machines: meshwright-worker --coordinator HOST:7420)";
 
@@ -38,21 +40,32 @@ std::string OwnAddress(const std::string& listen, int port) {
   return absl::StrCat(host, ":", port);
 }
 
+// Where callers have to show a key, the workers here need one too.
+absl::Status MakeWorkerKey(CoordinatorSettings& settings) {
+  if (settings.api_token_file.empty() || !settings.worker_token_file.empty()) return absl::OkStatus();
+  std::error_code error;
+  std::filesystem::create_directories(settings.data_folder, error);
+  settings.worker_token_file = settings.data_folder + "/worker-key";
+  return MakeKeyFile(settings.worker_token_file);
+}
+
 int Up(Arguments& arguments) {
   BlockStopSignals();
   CoordinatorSettings& settings = arguments.coordinator;
   settings.threads = AvailableCores();
   KeepFilesPrivate();
   if (settings.blobs.empty()) settings.blobs = settings.data_folder + "/blobs";
+  if (const absl::Status made = MakeWorkerKey(settings); !made.ok()) return Fail(made);
   const auto coordinator = CoordinatorProgram::Start(settings);
   if (!coordinator.ok()) return Fail(coordinator.status());
   std::vector<std::unique_ptr<WorkerProgram>> workers;
   std::vector<std::thread> threads;
   for (int i = 0; i < arguments.workers; ++i) {
     auto worker = WorkerProgram::Make({.coordinator = OwnAddress(settings.listen, (*coordinator)->port()),
-                                       .grpc_token_file = settings.grpc_token_file,
                                        .id = absl::StrCat("local-", i + 1),
                                        .blobs = settings.blobs,
+                                       .token_file = settings.worker_token_file,
+                                       .ca_file = settings.tls_certificate_file,
                                        .cores = std::max(1, AvailableCores() / arguments.workers),
                                        .drain_seconds = 0});
     if (!worker.ok()) return Fail(worker.status());
@@ -84,10 +97,7 @@ void AddUpCommand(CLI::App& program, Run& run) {
   command.footer(kExamples);
   CoordinatorSettings& settings = arguments->coordinator;
   NameInEnvironment(
-      command.add_option("--listen", settings.listen, "host:port; without --grpc-token-file everybody may call")
-          ->capture_default_str());
-  NameInEnvironment(command.add_option("--grpc-token-file", settings.grpc_token_file,
-                                       "file with the token that callers over gRPC have to show [none is asked for]"));
+      command.add_option("--listen", settings.listen, "host:port for workers and clients")->capture_default_str());
   NameInEnvironment(
       command.add_option("--data", settings.data_folder, "folder for everything that is kept")->capture_default_str());
   NameInEnvironment(

@@ -9,6 +9,7 @@
 #include <absl/strings/str_cat.h>
 #include <grpcpp/grpcpp.h>
 
+#include "meshwright/v1/access.grpc.pb.h"
 #include "meshwright/v1/reconstruction.grpc.pb.h"
 
 #include "common/base/digest.h"
@@ -29,8 +30,10 @@ absl::Status FromGrpc(const grpc::Status& status) {
 
 class RealServiceClient final : public ServiceClient {
  public:
-  RealServiceClient(const std::shared_ptr<grpc::Channel>& channel, const std::string& token)
-      : stub_(v1::ReconstructionService::NewStub(channel)), token_(token) {}
+  RealServiceClient(const std::shared_ptr<grpc::Channel>& channel, std::string key)
+      : stub_(v1::ReconstructionService::NewStub(channel)),
+        access_stub_(v1::AccessService::NewStub(channel)),
+        key_(std::move(key)) {}
 
   absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request) override {
     v1::CreateReconstructionResponse response;
@@ -41,7 +44,7 @@ class RealServiceClient final : public ServiceClient {
   absl::Status Upload(const std::string& id, const std::string& path, const std::string& local_path) override {
     MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(local_path));
     grpc::ClientContext context;
-    ShowToken(context);
+    ShowKey(context);
     v1::UploadSceneFileResponse response;
     const auto writer = stub_->UploadSceneFile(&context, &response);
     v1::UploadSceneFileRequest request;
@@ -84,7 +87,7 @@ class RealServiceClient final : public ServiceClient {
 
   absl::Status Watch(const std::string& id, const std::function<void(const v1::Reconstruction&)>& changed) override {
     grpc::ClientContext context;
-    ShowToken(context);
+    ShowKey(context);
     v1::WatchReconstructionRequest request;
     request.set_id(id);
     const auto reader = stub_->WatchReconstruction(&context, request);
@@ -112,7 +115,7 @@ class RealServiceClient final : public ServiceClient {
     MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, Get(id));
     MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
     grpc::ClientContext context;
-    ShowToken(context);
+    ShowKey(context);
     v1::DownloadMeshRequest request;
     request.set_id(id);
     const auto reader = stub_->DownloadMesh(&context, request);
@@ -146,7 +149,7 @@ class RealServiceClient final : public ServiceClient {
 
   absl::StatusOr<std::string> DownloadPart(const std::string& id, const v1::Part& part) override {
     grpc::ClientContext context;
-    ShowToken(context);
+    ShowKey(context);
     v1::DownloadPartRequest request;
     request.set_id(id);
     request.set_sequence(part.sequence());
@@ -162,6 +165,25 @@ class RealServiceClient final : public ServiceClient {
     return bytes;
   }
 
+  absl::StatusOr<v1::CreateKeyResponse> CreateKey(const v1::CreateKeyRequest& request) override {
+    v1::CreateKeyResponse response;
+    MW_RETURN_IF_ERROR(CallAccess(&v1::AccessService::Stub::CreateKey, request, response));
+    return response;
+  }
+
+  absl::StatusOr<v1::ListKeysResponse> ListKeys() override {
+    v1::ListKeysResponse response;
+    MW_RETURN_IF_ERROR(CallAccess(&v1::AccessService::Stub::ListKeys, v1::ListKeysRequest(), response));
+    return response;
+  }
+
+  absl::Status RevokeKey(const std::string& id) override {
+    v1::RevokeKeyRequest request;
+    request.set_id(id);
+    v1::RevokeKeyResponse response;
+    return CallAccess(&v1::AccessService::Stub::RevokeKey, request, response);
+  }
+
   absl::StatusOr<v1::ListWorkersResponse> ListWorkers() override {
     v1::ListWorkersResponse response;
     MW_RETURN_IF_ERROR(Call(&v1::ReconstructionService::Stub::ListWorkers, v1::ListWorkersRequest(), response));
@@ -169,30 +191,45 @@ class RealServiceClient final : public ServiceClient {
   }
 
  private:
-  void ShowToken(grpc::ClientContext& context) const {
-    if (!token_.empty()) context.AddMetadata("authorization", absl::StrCat("Bearer ", token_));
+  void ShowKey(grpc::ClientContext& context) const {
+    if (!key_.empty()) context.AddMetadata("authorization", absl::StrCat("Bearer ", key_));
   }
-  template <typename Request, typename Response>
-  absl::Status Call(grpc::Status (v1::ReconstructionService::Stub::*method)(grpc::ClientContext*, const Request&,
-                                                                            Response*),
-                    const Request& request, Response& response) {
+
+  template <typename Stub, typename Request, typename Response>
+  absl::Status CallOn(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                      const Request& request, Response& response) {
     grpc::ClientContext context;
-    ShowToken(context);
+    ShowKey(context);
     context.set_deadline(std::chrono::system_clock::now() + kCallDeadline);
-    return FromGrpc((stub_.get()->*method)(&context, request, &response));
+    return FromGrpc((stub.*method)(&context, request, &response));
+  }
+  template <typename Method, typename Request, typename Response>
+  absl::Status Call(Method method, const Request& request, Response& response) {
+    return CallOn(*stub_, method, request, response);
+  }
+  template <typename Method, typename Request, typename Response>
+  absl::Status CallAccess(Method method, const Request& request, Response& response) {
+    return CallOn(*access_stub_, method, request, response);
   }
 
   const std::unique_ptr<v1::ReconstructionService::Stub> stub_;
-  const std::string token_;
+  const std::unique_ptr<v1::AccessService::Stub> access_stub_;
+  const std::string key_;
 };
 
 }  // namespace
 
-std::unique_ptr<ServiceClient> ServiceClient::Connect(const std::string& address, const std::string& token) {
+std::unique_ptr<ServiceClient> ServiceClient::Connect(const std::string& address,
+                                                      const ServiceCredentials& credentials) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
   return std::make_unique<RealServiceClient>(
-      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments), token);
+      grpc::CreateCustomChannel(address,
+                                credentials.ca_certificates.empty()
+                                    ? grpc::InsecureChannelCredentials()
+                                    : grpc::SslCredentials({.pem_root_certs = credentials.ca_certificates}),
+                                arguments),
+      credentials.key);
 }
 
 }  // namespace meshwright

@@ -7,16 +7,21 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "meshwright/v1/access.pb.h"
 #include "meshwright/v1/reconstruction.pb.h"
 
 namespace meshwright {
 
-// ReconstructionService of the coordinator at "host:port". Errors are the coordinator's; Unavailable when it cannot be
-// reached.
+struct ServiceCredentials {
+  std::string key;              // "": none is shown
+  std::string ca_certificates;  // PEM, of those who may vouch for the coordinator; "": no TLS
+};
+
+// ReconstructionService and AccessService of the coordinator at "host:port". Errors are the coordinator's; Unavailable
+// when it cannot be reached.
 class ServiceClient {
  public:
-  // `token`: what the coordinator asks for; "": nothing.
-  static std::unique_ptr<ServiceClient> Connect(const std::string& address, const std::string& token = "");
+  static std::unique_ptr<ServiceClient> Connect(const std::string& address, const ServiceCredentials& credentials = {});
   virtual ~ServiceClient() = default;
 
   virtual absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request) = 0;
@@ -36,6 +41,9 @@ class ServiceClient {
   // One of them, encoded (docs/formats/surface.md), with the digest that `part` names.
   virtual absl::StatusOr<std::string> DownloadPart(const std::string& id, const v1::Part& part) = 0;
   virtual absl::StatusOr<v1::ListWorkersResponse> ListWorkers() = 0;
+  virtual absl::StatusOr<v1::CreateKeyResponse> CreateKey(const v1::CreateKeyRequest& request) = 0;
+  virtual absl::StatusOr<v1::ListKeysResponse> ListKeys() = 0;
+  virtual absl::Status RevokeKey(const std::string& id) = 0;
 };
 
 }  // namespace meshwright

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 
@@ -25,6 +26,12 @@ absl::StatusOr<HostPort> ParseHostPort(const std::string& text, const std::strin
   const bool has_blank = std::ranges::any_of(address.host, absl::ascii_isspace);
   if (address.host.empty() || has_blank || is_ipv6 != in_brackets) return wrong();
   return address;
+}
+
+bool IsLoopbackHost(const std::string& host) {
+  // "127.example.org" is a name, and anybody's.
+  const bool is_ipv4 = host.find_first_not_of("0123456789.") == std::string::npos;
+  return absl::EqualsIgnoreCase(host, "localhost") || host == "::1" || (is_ipv4 && absl::StartsWith(host, "127."));
 }
 
 }  // namespace meshwright

@@ -14,5 +14,8 @@ struct HostPort {
 // "HOST:PORT" or "[IPV6]:PORT". InvalidArgument calls the text by `name`: "--listen is \"7420\", expected host:port".
 absl::StatusOr<HostPort> ParseHostPort(const std::string& text, const std::string& name);
 
+// Whether only this machine itself reaches `host`: "localhost", 127.x.y.z or ::1.
+bool IsLoopbackHost(const std::string& host);
+
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

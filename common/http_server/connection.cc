@@ -244,6 +244,7 @@ void Connection::TakeHead(size_t bytes) {
   const auto fault = parser_->ParseHead(
       head, {.max_start_line_bytes = options.max_start_line_bytes, .max_fields = options.max_header_fields}, request);
   request.caller = CallerOf(request);
+  request.is_tls = tls_context_ != nullptr;
   if (fault) return Fault(*fault);
   if (request.has_body && (request.method == "GET" || request.method == "HEAD")) {
     return Fault({400, "", absl::StrCat("the body is there, expected none with ", request.method)});

@@ -39,6 +39,7 @@ struct HttpRequest {
   bool has_body = false;
   // The address of who asks: the peer's or, when that is a trusted proxy, what it says in X-Forwarded-For.
   std::string caller;
+  bool is_tls = false;  // as it came to this server
 
   bool HasParam(const std::string& name) const { return params.count(name) > 0; }
   // The first one; "" when there is none.

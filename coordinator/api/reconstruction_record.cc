@@ -6,6 +6,7 @@
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
+#include "coordinator/api/public_text.h"
 #include "coordinator/dispatch/proto_times.h"
 
 namespace meshwright {
@@ -51,7 +52,7 @@ v1::Reconstruction ToProto(const Reconstruction& stored) {
   v1::Reconstruction reconstruction;
   reconstruction.set_id(stored.id);
   reconstruction.set_state(ToProto(stored.state));
-  if (stored.state == ReconstructionState::kFailed) reconstruction.set_failure(stored.state_reason);
+  if (stored.state == ReconstructionState::kFailed) reconstruction.set_failure(WithoutServerPaths(stored.state_reason));
   reconstruction.set_options_json(stored.options_json);
   reconstruction.set_scene_reference(stored.scene_reference);
   reconstruction.set_weight(stored.weight);
@@ -83,7 +84,7 @@ v1::Attempt ToProto(const std::string& reconstruction, const Attempt& stored) {
   for (const auto& [text, ending] : kEndings) {
     if (stored.ending == text) attempt.set_ending(ending);
   }
-  attempt.set_reason(stored.reason);
+  attempt.set_reason(WithoutServerPaths(stored.reason));
   return attempt;
 }
 

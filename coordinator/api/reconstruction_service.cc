@@ -11,6 +11,8 @@
 
 #include "common/base/status_macros.h"
 #include "common/scene/scene_codec.h"
+#include "coordinator/api/public_text.h"
+#include "coordinator/auth/gatekeeper.h"
 
 namespace meshwright {
 namespace {
@@ -196,9 +198,7 @@ void ReconstructionService::TellEnd(const std::string& id) {
 }
 
 absl::StatusOr<Reconstruction> ReconstructionService::Find(const std::string& id) const {
-  const auto none = [&] {
-    return absl::NotFoundError(absl::StrCat("there is no reconstruction \"", id.substr(0, 64), "\""));
-  };
+  const auto none = [&] { return NoSuchReconstruction(id); };
   if (!ValidateReconstructionId(id).ok()) return none();
   absl::StatusOr<Reconstruction> stored = environment_.store->GetReconstruction(id);
   if (absl::IsNotFound(stored.status())) return none();
@@ -216,7 +216,8 @@ v1::Reconstruction ReconstructionService::Describe(const Reconstruction& stored)
   return reconstruction;
 }
 
-absl::StatusOr<v1::Reconstruction> ReconstructionService::Create(const v1::CreateReconstructionRequest& request) {
+absl::StatusOr<v1::Reconstruction> ReconstructionService::Create(const v1::CreateReconstructionRequest& request,
+                                                                 const std::string& owner) {
   MW_RETURN_IF_ERROR(ValidateReconstructionId(request.id()));
   const double weight = request.weight() == 0 ? 1 : request.weight();
   if (!(weight >= kMinWeight && weight <= kMaxWeight)) {
@@ -231,7 +232,8 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Create(const v1::Creat
                                  .options_json = config.options_json,
                                  .state = ReconstructionState::kCreated,
                                  .weight = std::round(weight / kMinWeight) * kMinWeight,
-                                 .scene_reference = request.scene_reference()};
+                                 .scene_reference = request.scene_reference(),
+                                 .owner = owner};
   absl::StatusOr<Reconstruction> stored = Find(wanted.id);
   if (absl::IsNotFound(stored.status())) {
     MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
@@ -245,8 +247,8 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Create(const v1::Creat
         absl::StrCat("id \"", wanted.id, "\" is that of a reconstruction that was deleted"));
   }
   MW_RETURN_IF_ERROR(stored.status());
-  if (stored->options_json != wanted.options_json || stored->scene_reference != wanted.scene_reference ||
-      std::abs(stored->weight - wanted.weight) > kMinWeight / 2) {
+  if (stored->owner != wanted.owner || stored->options_json != wanted.options_json ||
+      stored->scene_reference != wanted.scene_reference || std::abs(stored->weight - wanted.weight) > kMinWeight / 2) {
     return absl::AlreadyExistsError(absl::StrCat("id \"", wanted.id, "\" is that of another reconstruction"));
   }
   return Describe(*stored);
@@ -321,7 +323,7 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Get(const std::string&
 }
 
 absl::StatusOr<v1::ListReconstructionsResponse> ReconstructionService::List(
-    const v1::ListReconstructionsRequest& request) const {
+    const v1::ListReconstructionsRequest& request, const std::optional<std::string>& owner) const {
   if (request.page_size() < 0 || request.page_size() > kMaxPageSize) {
     return absl::InvalidArgumentError(
         absl::StrCat("page_size is ", request.page_size(), ", expected 0..", kMaxPageSize));
@@ -331,8 +333,10 @@ absl::StatusOr<v1::ListReconstructionsResponse> ReconstructionService::List(
   if (!request.page_token().empty() && !ValidateReconstructionId(request.page_token()).ok()) {
     return absl::InvalidArgumentError("page_token: expected what the page before said");
   }
+  JobStore& store = *environment_.store;
   MW_ASSIGN_OR_RETURN(const std::vector<Reconstruction> page,
-                      environment_.store->ListReconstructions(request.page_token(), page_size + 1));
+                      owner ? store.ListReconstructionsOf(*owner, request.page_token(), page_size + 1)
+                            : store.ListReconstructions(request.page_token(), page_size + 1));
   v1::ListReconstructionsResponse response;
   for (const Reconstruction& stored : page) {
     if (response.reconstructions_size() == page_size) {
@@ -397,10 +401,10 @@ absl::StatusOr<v1::ListCamerasResponse> ReconstructionService::ListCameras(const
     const bool committed = static_cast<size_t>(job.sequence) <= commits.size();
     camera.set_state(CameraStateOf(job.state, committed));
     camera.set_sequence(job.sequence);
-    camera.set_skip_reason(job.skip_reason);
+    camera.set_skip_reason(WithoutServerPaths(job.skip_reason));
     camera.set_report_json(job.report_json);
     camera.set_failed_attempts(static_cast<int32_t>(job.failed_attempts));
-    camera.set_last_failure(job.last_failure);
+    camera.set_last_failure(WithoutServerPaths(job.last_failure));
     camera.set_reduction(static_cast<int32_t>(job.reduction));
     camera.set_worker(job.lease_worker);
     camera.set_memory_bytes(job.memory_bytes);
@@ -488,7 +492,7 @@ absl::StatusOr<std::string> ReconstructionService::PartBytes(const std::string& 
   return environment_.blobs->Get(part.sha256());
 }
 
-absl::Status ReconstructionService::Watch(const std::string& id,
+absl::Status ReconstructionService::Watch(const std::string& id, const std::function<bool()>& cancelled,
                                           const std::function<bool(const v1::Reconstruction&)>& send) {
   std::string told;
   while (true) {
@@ -498,6 +502,7 @@ absl::Status ReconstructionService::Watch(const std::string& id,
       if (stopping_) return absl::UnavailableError("the coordinator is going down");
       version = version_;
     }
+    if (cancelled()) return absl::CancelledError("nobody watches any more");
     MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, Get(id));
     if (std::string now = reconstruction.SerializeAsString(); now != told) {
       if (!send(reconstruction)) return absl::CancelledError("nobody watches any more");

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -45,7 +46,9 @@ class ReconstructionService {
   // Ends all of them after what they are doing at the moment.
   ~ReconstructionService();
 
-  absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request);
+  // `owner`: whose it is; "": nobody's in particular.
+  absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request,
+                                            const std::string& owner = "");
   // Creates one of the files that were uploaded for `source`, whatever has become of that, or of the same
   // scene_reference: with other options nothing has to be sent again. Repeating it is harmless.
   absl::StatusOr<v1::Reconstruction> CreateAgain(const std::string& source, v1::CreateReconstructionRequest request);
@@ -58,7 +61,9 @@ class ReconstructionService {
   absl::StatusOr<std::vector<SceneFile>> ListSceneFiles(const std::string& id) const;
   absl::StatusOr<v1::Reconstruction> Start(const std::string& id);
   absl::StatusOr<v1::Reconstruction> Get(const std::string& id) const;
-  absl::StatusOr<v1::ListReconstructionsResponse> List(const v1::ListReconstructionsRequest& request) const;
+  // Of this owner alone, if one is named.
+  absl::StatusOr<v1::ListReconstructionsResponse> List(const v1::ListReconstructionsRequest& request,
+                                                       const std::optional<std::string>& owner = std::nullopt) const;
   absl::StatusOr<v1::Reconstruction> Cancel(const std::string& id);
   absl::Status Delete(const std::string& id);
   absl::StatusOr<v1::ListCamerasResponse> ListCameras(const std::string& id) const;
@@ -74,8 +79,10 @@ class ReconstructionService {
   absl::StatusOr<std::string> MeshPath(const std::string& id) const;
   absl::StatusOr<std::string> PartBytes(const std::string& id, SequenceNumber sequence) const;
 
-  // Calls `send` with what it is and again when it has changed, until it is over, `send` gives false or Shutdown().
-  absl::Status Watch(const std::string& id, const std::function<bool(const v1::Reconstruction&)>& send);
+  // Calls `send` with what it is and again when it has changed, until it is over, `send` gives false, `cancelled`,
+  // which is asked every half second, gives true, or Shutdown().
+  absl::Status Watch(const std::string& id, const std::function<bool()>& cancelled,
+                     const std::function<bool(const v1::Reconstruction&)>& send);
   // Ends all Watch().
   void Shutdown();
 

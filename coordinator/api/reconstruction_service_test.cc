@@ -5,8 +5,10 @@
 #include <functional>
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "common/base/check.h"
 #include "common/base/digest.h"
@@ -164,10 +166,12 @@ class ReconstructionServiceTest : public testing::Test {
   }
   v1::Reconstruction WaitFor(const std::string& id) {
     v1::Reconstruction last;
-    const absl::Status status = service_->Watch(id, [&](const v1::Reconstruction& now) {
-      last = now;
-      return true;
-    });
+    const absl::Status status = service_->Watch(
+        id, [] { return false; },
+        [&](const v1::Reconstruction& now) {
+          last = now;
+          return true;
+        });
     EXPECT_TRUE(status.ok()) << status;
     return last;
   }
@@ -313,6 +317,56 @@ TEST_F(ReconstructionServiceTest, PagesGoThroughAll) {
   EXPECT_THAT(ids, testing::ElementsAre("r0", "r1", "r2", "r3", "r4", "r5", "r6"));
   request.set_page_size(-1);
   EXPECT_THAT(std::string(service_->List(request).status().message()), HasSubstr("page_size"));
+}
+
+TEST_F(ReconstructionServiceTest, AScenesAuthorReadsNothingElse) {
+  MW_CHECK(WriteFileAtomically(folder_ + "/secret.txt", "the password is hunter2\n").ok());
+  MW_CHECK(WritePng(folder_ + "/secret.png", {64, 48, std::vector<uint8_t>(3 * 64 * 48)}).ok());
+  const std::string wall = folder_ + "/roots/wall";
+  const auto replace = [&](const std::string& name, const std::string& target) {
+    fs::remove(wall + name);
+    fs::create_symlink(target, wall + name);
+  };
+  const auto rename_photograph = [&](const std::string& to) {
+    const std::string path = wall + "/model/images.txt";
+    MW_CHECK(WriteFileAtomically(path, absl::StrReplaceAll(*ReadFile(path), {{"v0.png", to}})).ok());
+  };
+  const std::pair<const char*, std::function<void()>> attacks[] = {
+      {"photograph-link", [&] { replace("/images/v0.png", folder_ + "/secret.png"); }},
+      {"model-link", [&] { replace("/model/cameras.txt", folder_ + "/secret.txt"); }},
+      {"folder-link",
+       [&] {
+         fs::rename(wall + "/images", folder_ + "/elsewhere");
+         fs::create_directory_symlink(folder_ + "/elsewhere", wall + "/images");
+       }},
+      {"device", [&] { replace("/images/v0.png", "/dev/zero"); }},
+      {"pipe",
+       [&] {
+         fs::remove(wall + "/images/v0.png");
+         MW_CHECK(::mkfifo((wall + "/images/v0.png").c_str(), 0600) == 0);
+       }},
+      {"name", [&] { rename_photograph("../../../secret.png"); }},
+      {"absolute-name", [&] { rename_photograph(folder_ + "/secret.png"); }}};
+  for (const auto& [id, spoil] : attacks) {
+    fs::remove_all(wall);
+    fs::remove_all(folder_ + "/elsewhere");
+    WriteWall(folder_ + "/roots");
+    spoil();
+    CreateAndStart(id);
+    v1::Reconstruction last;
+    ASSERT_TRUE(service_
+                    ->Watch(
+                        id, [] { return false; },
+                        [&](const v1::Reconstruction& now) {
+                          last = now;
+                          return now.state() != v1::RECONSTRUCTION_STATE_RUNNING;
+                        })
+                    .ok())
+        << id << ": " << last.DebugString();
+    EXPECT_EQ(last.state(), v1::RECONSTRUCTION_STATE_FAILED) << id;
+    EXPECT_THAT(last.failure(), testing::Not(HasSubstr(folder_))) << id;
+    EXPECT_THAT(last.failure(), testing::Not(HasSubstr("hunter2"))) << id;
+  }
 }
 
 TEST_F(ReconstructionServiceTest, AnUploadIsThereWholeOrNotAtAll) {

@@ -167,7 +167,8 @@ absl::StatusOr<std::string> ReconstructionDriver::SceneFolder(bool* is_temporary
 absl::StatusOr<IngestedScene> ReconstructionDriver::Take() {
   bool is_temporary = false;
   MW_ASSIGN_OR_RETURN(const std::string folder, SceneFolder(&is_temporary));
-  absl::StatusOr<IngestedScene> taken = IngestScene(folder, referenced_blobs_, *environment_.pool);
+  absl::StatusOr<IngestedScene> taken = IngestScene(
+      folder, is_temporary ? folder : SceneRootOf(folder, folders_.scene_roots), referenced_blobs_, *environment_.pool);
   std::error_code error;
   if (is_temporary) fs::remove_all(folder, error);
   return taken;

@@ -1,11 +1,16 @@
 #include "coordinator/conductor/scene_ingestion.h"
 
+#include <cstdint>
 #include <filesystem>
-#include <optional>
+#include <set>
+#include <system_error>
 #include <utility>
+#include <vector>
 
+#include <absl/strings/cord.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 
 #include "common/base/bad_input.h"
 #include "common/base/files.h"
@@ -22,6 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kFileScheme[] = "file:";
+constexpr int64_t kMaxEntries = 1'000'000;
 
 bool IsBelow(const fs::path& path, const fs::path& root) {
   auto at = path.begin();
@@ -31,6 +37,69 @@ bool IsBelow(const fs::path& path, const fs::path& root) {
     ++at;
   }
   return true;
+}
+
+// Links may point to anything below `root`. What is neither a file nor a folder would be waited for, or read for ever.
+absl::Status CheckLinks(const fs::path& folder, const fs::path& root) {
+  std::vector<fs::path> folders = {folder};
+  std::set<fs::path> seen;
+  for (int64_t entries = 0; !folders.empty();) {
+    std::error_code error;
+    const fs::path at = fs::canonical(folders.back(), error);
+    folders.pop_back();
+    if (error || !seen.insert(at).second) continue;
+    for (const fs::directory_entry& entry : fs::directory_iterator(at, error)) {
+      if (++entries > kMaxEntries) {
+        return BadInput(absl::InvalidArgumentError(absl::StrCat("the scene has more than ", kMaxEntries, " files")));
+      }
+      std::error_code of_entry;
+      if (!entry.is_symlink(of_entry) && entry.is_regular_file(of_entry)) continue;
+      const fs::path real = fs::canonical(entry.path(), of_entry);
+      const std::string name = entry.path().lexically_relative(folder).string();
+      if (of_entry) continue;  // a link to nothing is read by nobody
+      if (!IsBelow(real, root)) {
+        return BadInput(
+            absl::InvalidArgumentError(absl::StrCat("path \"", name, "\": a link that leaves the scene's folder")));
+      }
+      if (fs::is_directory(real, of_entry)) {
+        folders.push_back(real);
+      } else if (!fs::is_regular_file(real, of_entry)) {
+        return BadInput(
+            absl::InvalidArgumentError(absl::StrCat("path \"", name, "\": a device or pipe, expected a file")));
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckPhotographs(const Scene& scene, const fs::path& root) {
+  for (const SceneView& view : scene.views) {
+    std::error_code error;
+    const fs::path real = fs::canonical(view.image_path, error);
+    if (error || IsBelow(real, root)) continue;  // what is not there is said by whoever reads it
+    return BadInput(absl::InvalidArgumentError(
+        absl::StrCat("photograph \"", view.name.substr(0, 100), "\" lies outside of the scene's folder")));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<IngestedScene> IngestConfined(const std::string& folder, const std::string& root, ReferencedBlobs& blobs,
+                                             ThreadPool& pool) {
+  std::error_code error;
+  const fs::path real_root = fs::canonical(root, error);
+  if (error) return absl::UnavailableError(absl::StrCat(root, ": ", error.message()));
+  MW_RETURN_IF_ERROR(CheckLinks(folder, real_root));
+  absl::StatusOr<Scene> scene = ImportScene(folder);
+  if (!scene.ok()) return BadInput(scene.status());
+  MW_RETURN_IF_ERROR(CheckPhotographs(*scene, real_root));
+  IngestedScene taken;
+  MW_ASSIGN_OR_RETURN(taken.scene_digest, CheckAndDigestScene(*scene, pool, [](int) {}));
+  for (SceneView& view : scene->views) {
+    MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(view.image_path));
+    MW_ASSIGN_OR_RETURN(view.image_path, blobs.Put(bytes));
+  }
+  MW_ASSIGN_OR_RETURN(taken.scene_blob, blobs.Put(EncodeScene(*scene)));
+  return taken;
 }
 
 }  // namespace
@@ -56,17 +125,23 @@ absl::StatusOr<std::string> ResolveSceneReference(const std::string& reference, 
       absl::StrCat("scene_reference \"", reference, "\": no such folder below the ", roots.size(), " roots of scenes"));
 }
 
-absl::StatusOr<IngestedScene> IngestScene(const std::string& folder, ReferencedBlobs& blobs, ThreadPool& pool) {
-  absl::StatusOr<Scene> scene = ImportScene(folder);
-  if (!scene.ok()) return BadInput(scene.status());
-  IngestedScene taken;
-  MW_ASSIGN_OR_RETURN(taken.scene_digest, CheckAndDigestScene(*scene, pool, [](int) {}));
-  for (SceneView& view : scene->views) {
-    MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(view.image_path));
-    MW_ASSIGN_OR_RETURN(view.image_path, blobs.Put(bytes));
+std::string SceneRootOf(const std::string& folder, const std::vector<std::string>& roots) {
+  for (const std::string& root : roots) {
+    std::error_code error;
+    const fs::path real_root = fs::canonical(root, error);
+    if (!error && IsBelow(folder, real_root)) return real_root.string();
   }
-  MW_ASSIGN_OR_RETURN(taken.scene_blob, blobs.Put(EncodeScene(*scene)));
-  return taken;
+  return folder;
+}
+
+absl::StatusOr<IngestedScene> IngestScene(const std::string& folder, const std::string& root, ReferencedBlobs& blobs,
+                                          ThreadPool& pool) {
+  absl::StatusOr<IngestedScene> taken = IngestConfined(folder, root, blobs, pool);
+  if (taken.ok()) return taken;
+  absl::Status inside(taken.status().code(), absl::StrReplaceAll(taken.status().message(), {{folder + "/", ""}}));
+  taken.status().ForEachPayload(
+      [&](absl::string_view name, const absl::Cord& payload) { inside.SetPayload(name, payload); });
+  return inside;
 }
 
 absl::Status MaterializeScene(const std::vector<SceneFile>& files, BlobStore& blobs, const std::string& folder) {

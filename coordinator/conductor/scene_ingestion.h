@@ -22,9 +22,15 @@ struct IngestedScene {
   std::string scene_blob;    // EncodeScene, with the digest of each picture's blob as its image_path
 };
 
+// The one of `roots` that `folder`, as ResolveSceneReference gives it, is below; `folder` itself when there is none.
+std::string SceneRootOf(const std::string& folder, const std::vector<std::string>& roots);
+
 // Reads the scene in `folder`, checks every photograph and puts all of it into the BlobStore: from then on the folder
-// is not needed any more and nothing that happens to it changes the reconstruction. Errors of the scene are bad input.
-absl::StatusOr<IngestedScene> IngestScene(const std::string& folder, ReferencedBlobs& blobs, ThreadPool& pool);
+// is not needed any more and nothing that happens to it changes the reconstruction. Nothing is read outside of `root`,
+// which has the folder in it, whatever links and names of photographs say. Errors of the scene are bad input; they call
+// its files by their paths in the folder.
+absl::StatusOr<IngestedScene> IngestScene(const std::string& folder, const std::string& root, ReferencedBlobs& blobs,
+                                          ThreadPool& pool);
 
 // Makes `folder` anew with the files of an upload. DataLoss names a file whose blob is damaged or lost.
 absl::Status MaterializeScene(const std::vector<SceneFile>& files, BlobStore& blobs, const std::string& folder);

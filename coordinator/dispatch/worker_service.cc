@@ -19,6 +19,10 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr size_t kMaxIdLength = 128;
 constexpr int kMaxCores = 4096;
+constexpr int64_t kMaxMemoryBytes = int64_t{1} << 50;
+constexpr int kMaxHeldJobs = 2 * kMaxCores;
+constexpr size_t kMaxWorkers = 10'000;
+constexpr size_t kMaxCalls = 2 * kMaxWorkers;
 constexpr double kMaxWaitTimeoutSeconds = 60;
 // Other coordinators, and backoffs that end, are noticed by looking again: often while a worker waits.
 constexpr std::chrono::milliseconds kPoll(100);
@@ -58,8 +62,17 @@ absl::Status Validate(const v1::SynchronizeRequest& request) {
   if (request.cores() < 1 || request.cores() > kMaxCores) {
     return absl::InvalidArgumentError(absl::StrCat("cores is ", request.cores(), ", expected 1..", kMaxCores));
   }
-  if (request.memory_bytes() < 1) {
-    return absl::InvalidArgumentError(absl::StrCat("memory_bytes is ", request.memory_bytes(), ", expected >= 1"));
+  if (request.memory_bytes() < 1 || request.memory_bytes() > kMaxMemoryBytes) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("memory_bytes is ", request.memory_bytes(), ", expected 1..", kMaxMemoryBytes));
+  }
+  if (request.version().size() > kMaxIdLength) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("version has ", request.version().size(), " characters, expected at most ", kMaxIdLength));
+  }
+  if (request.held_size() > kMaxHeldJobs) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("held has ", request.held_size(), " jobs, expected at most ", kMaxHeldJobs));
   }
   if (!(request.wait_timeout_seconds() >= 0 && request.wait_timeout_seconds() <= kMaxWaitTimeoutSeconds)) {
     return absl::InvalidArgumentError(absl::StrCat("wait_timeout_seconds is ", request.wait_timeout_seconds(),
@@ -134,6 +147,10 @@ int64_t WorkerService::Synchronize(const v1::SynchronizeRequest& request, Answer
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (stopping_ && status.ok()) status = absl::UnavailableError("the coordinator is going down");
+    if (status.ok() && workers_.size() >= kMaxWorkers && workers_.count(request.worker_id()) == 0) {
+      status = absl::ResourceExhaustedError(absl::StrCat("there are ", kMaxWorkers, " workers already"));
+    }
+    if (status.ok() && calls_.size() >= kMaxCalls) status = absl::ResourceExhaustedError("too many workers wait");
     if (status.ok()) {
       const double wait = std::min(request.wait_timeout_seconds(), absl::ToDoubleSeconds(lease_.lease / 3));
       const auto deadline =

@@ -11,25 +11,30 @@
 #include <absl/time/clock.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
+#include <grpcpp/resource_quota.h>
+#include <grpcpp/security/tls_certificate_provider.h>
+#include <grpcpp/security/tls_credentials_options.h>
 
 #include "meshwright/v1/reconstruction.grpc.pb.h"
 #include "meshwright/v1/worker.grpc.pb.h"
 
-#include "common/base/digest.h"
 #include "common/base/mutex.h"
 #include "common/base/status_macros.h"
 #include "common/blob/staged_blob.h"
+#include "coordinator/api/guarded_calls.h"
+#include "coordinator/grpc/access_service.h"
+#include "coordinator/grpc/grpc_gate.h"
 
 namespace meshwright {
 namespace {
 
+constexpr int kMaxThreads = 1024;
+constexpr int kMaxLongCalls = 512;
+constexpr int kMaxLongCallsOfOne = 64;
+constexpr unsigned int kReadCertificatesEverySeconds = 10;
 constexpr size_t kChunkBytes = size_t{256} << 10;
 // Of what a worker makes: nobody may fill the disk.
 constexpr int64_t kMaxBlobBytes = int64_t{2} << 30;
-
-grpc::Status ToGrpc(const absl::Status& status) {
-  return {static_cast<grpc::StatusCode>(status.code()), std::string(status.message())};
-}
 
 template <typename Value, typename Fill>
 grpc::Status Answer(const absl::StatusOr<Value>& value, const Fill& fill) {
@@ -62,126 +67,152 @@ absl::Status SendFile(const std::string& path, int64_t offset, grpc::ServerWrite
   return std::ferror(file.get()) != 0 ? absl::DataLossError("the mesh's file cannot be read") : absl::OkStatus();
 }
 
-// Who may call.
-class Guard {
- public:
-  // "": everybody.
-  explicit Guard(const std::string& token) : is_open_(token.empty()), digest_(Sha256Hex("Bearer " + token)) {}
-
-  // Digests are compared, so that the time it takes says nothing of the token.
-  bool Admits(const grpc::ServerContextBase& context) const {
-    if (is_open_) return true;
-    const auto found = context.client_metadata().find("authorization");
-    return found != context.client_metadata().end() &&
-           Sha256Hex(std::string(found->second.data(), found->second.size())) == digest_;
-  }
-
- private:
-  const bool is_open_;
-  const std::string digest_;
-};
-
-grpc::Status Refused() {
-  return {grpc::StatusCode::UNAUTHENTICATED, "the token is not the one expected (--grpc-token-file)"};
-}
-
 class ReconstructionServiceImpl final : public v1::ReconstructionService::Service {
  public:
-  ReconstructionServiceImpl(const Guard& guard, ReconstructionService& service, WorkerService& workers)
-      : guard_(guard), service_(service), workers_(workers) {}
+  ReconstructionServiceImpl(ReconstructionService& service, WorkerService& workers, Gatekeeper& gate)
+      : service_(service), workers_(workers), gate_(gate) {}
 
   grpc::Status CreateReconstruction(grpc::ServerContext* context, const v1::CreateReconstructionRequest* request,
                                     v1::CreateReconstructionResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(service_.Create(*request), [&](const auto& value) { *response->mutable_reconstruction() = value; });
+    return Guarded(gate_, *context,
+                   {.action = Action::kCreate, .deed = "CreateReconstruction", .reconstruction = request->id()},
+                   [&](const Caller& caller) {
+                     return Answer(CreateFor(caller, gate_, service_, *request),
+                                   [&](const auto& value) { *response->mutable_reconstruction() = value; });
+                   });
   }
   grpc::Status UploadSceneFile(grpc::ServerContext* context, grpc::ServerReader<v1::UploadSceneFileRequest>* reader,
                                v1::UploadSceneFileResponse*) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return ToGrpc(Upload(*reader));
+    // Who shows no valid key is not waited for.
+    const absl::StatusOr<Caller> caller = Identify(gate_, *context);
+    if (!caller.ok()) return ToGrpc(caller.status());
+    return ToGrpc(long_calls_.Run(NameFor(*caller), [&] { return Upload(*caller, *reader); }));
   }
   grpc::Status StartReconstruction(grpc::ServerContext* context, const v1::StartReconstructionRequest* request,
                                    v1::StartReconstructionResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(service_.Start(request->id()),
-                  [&](const auto& value) { *response->mutable_reconstruction() = value; });
+    return Guarded(gate_, *context,
+                   {.action = Action::kChange, .deed = "StartReconstruction", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     return Answer(service_.Start(request->id()),
+                                   [&](const auto& value) { *response->mutable_reconstruction() = value; });
+                   });
   }
   grpc::Status GetReconstruction(grpc::ServerContext* context, const v1::GetReconstructionRequest* request,
                                  v1::GetReconstructionResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(service_.Get(request->id()), [&](const auto& value) { *response->mutable_reconstruction() = value; });
+    return Guarded(gate_, *context,
+                   {.action = Action::kRead, .deed = "GetReconstruction", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     return Answer(service_.Get(request->id()),
+                                   [&](const auto& value) { *response->mutable_reconstruction() = value; });
+                   });
   }
   grpc::Status ListReconstructions(grpc::ServerContext* context, const v1::ListReconstructionsRequest* request,
                                    v1::ListReconstructionsResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(service_.List(*request), [&](const auto& value) { *response = value; });
+    return Guarded(gate_, *context, {.action = Action::kList, .deed = "ListReconstructions"},
+                   [&](const Caller& caller) {
+                     return Answer(ListFor(caller, service_, *request), [&](const auto& value) { *response = value; });
+                   });
   }
   grpc::Status WatchReconstruction(grpc::ServerContext* context, const v1::WatchReconstructionRequest* request,
                                    grpc::ServerWriter<v1::WatchReconstructionResponse>* writer) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return ToGrpc(service_.Watch(request->id(), [&](const v1::Reconstruction& reconstruction) {
-      v1::WatchReconstructionResponse response;
-      *response.mutable_reconstruction() = reconstruction;
-      return !context->IsCancelled() && writer->Write(response);
-    }));
+    return Guarded(gate_, *context,
+                   {.action = Action::kRead, .deed = "WatchReconstruction", .reconstruction = request->id()},
+                   [&](const Caller& caller) {
+                     return ToGrpc(long_calls_.Run(NameFor(caller), [&] {
+                       return service_.Watch(
+                           request->id(), [&] { return context->IsCancelled(); },
+                           [&](const v1::Reconstruction& reconstruction) {
+                             v1::WatchReconstructionResponse response;
+                             *response.mutable_reconstruction() = reconstruction;
+                             return writer->Write(response);
+                           });
+                     }));
+                   });
   }
   grpc::Status CancelReconstruction(grpc::ServerContext* context, const v1::CancelReconstructionRequest* request,
                                     v1::CancelReconstructionResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(service_.Cancel(request->id()),
-                  [&](const auto& value) { *response->mutable_reconstruction() = value; });
+    return Guarded(gate_, *context,
+                   {.action = Action::kChange, .deed = "CancelReconstruction", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     return Answer(service_.Cancel(request->id()),
+                                   [&](const auto& value) { *response->mutable_reconstruction() = value; });
+                   });
   }
   grpc::Status DeleteReconstruction(grpc::ServerContext* context, const v1::DeleteReconstructionRequest* request,
                                     v1::DeleteReconstructionResponse*) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return ToGrpc(service_.Delete(request->id()));
+    return Guarded(gate_, *context,
+                   {.action = Action::kChange, .deed = "DeleteReconstruction", .reconstruction = request->id()},
+                   [&](const Caller&) { return ToGrpc(service_.Delete(request->id())); });
   }
   grpc::Status ListCameras(grpc::ServerContext* context, const v1::ListCamerasRequest* request,
                            v1::ListCamerasResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(service_.ListCameras(request->id()), [&](const auto& value) { *response = value; });
+    return Guarded(gate_, *context, {.action = Action::kRead, .deed = "ListCameras", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     return Answer(service_.ListCameras(request->id()), [&](const auto& value) { *response = value; });
+                   });
   }
   grpc::Status GetIncidence(grpc::ServerContext* context, const v1::GetIncidenceRequest* request,
                             v1::GetIncidenceResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(service_.GetIncidence(request->id()), [&](const auto& value) { *response = value; });
+    return Guarded(gate_, *context, {.action = Action::kRead, .deed = "GetIncidence", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     return Answer(service_.GetIncidence(request->id()), [&](const auto& value) { *response = value; });
+                   });
   }
   grpc::Status ListParts(grpc::ServerContext* context, const v1::ListPartsRequest* request,
                          v1::ListPartsResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(service_.ListParts(request->id(), request->after()), [&](const auto& value) { *response = value; });
+    return Guarded(gate_, *context, {.action = Action::kRead, .deed = "ListParts", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     return Answer(service_.ListParts(request->id(), request->after()),
+                                   [&](const auto& value) { *response = value; });
+                   });
   }
   grpc::Status DownloadMesh(grpc::ServerContext* context, const v1::DownloadMeshRequest* request,
                             grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {
-    if (!guard_.Admits(*context)) return Refused();
-    const absl::StatusOr<std::string> path = service_.MeshPath(request->id());
-    return ToGrpc(path.ok() ? SendFile(*path, request->offset_bytes(), *writer) : path.status());
+    return Guarded(gate_, *context, {.action = Action::kRead, .deed = "DownloadMesh", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     const absl::StatusOr<std::string> path = service_.MeshPath(request->id());
+                     return ToGrpc(path.ok() ? SendFile(*path, request->offset_bytes(), *writer) : path.status());
+                   });
   }
   grpc::Status DownloadPart(grpc::ServerContext* context, const v1::DownloadPartRequest* request,
                             grpc::ServerWriter<v1::DownloadPartResponse>* writer) override {
-    if (!guard_.Admits(*context)) return Refused();
-    const absl::StatusOr<std::string> bytes = service_.PartBytes(request->id(), request->sequence());
-    return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
+    return Guarded(gate_, *context, {.action = Action::kRead, .deed = "DownloadPart", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     const absl::StatusOr<std::string> bytes = service_.PartBytes(request->id(), request->sequence());
+                     return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
+                   });
   }
   grpc::Status ListAttempts(grpc::ServerContext* context, const v1::ListAttemptsRequest* request,
                             v1::ListAttemptsResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(service_.ListAttempts(*request), [&](const auto& value) { *response = value; });
+    return Guarded(gate_, *context, {.action = Action::kRead, .deed = "ListAttempts", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     return Answer(service_.ListAttempts(*request), [&](const auto& value) { *response = value; });
+                   });
   }
   grpc::Status ListWorkers(grpc::ServerContext* context, const v1::ListWorkersRequest*,
                            v1::ListWorkersResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    *response = workers_.ListWorkers();
-    return grpc::Status::OK;
+    return Guarded(gate_, *context, {.action = Action::kInspect, .deed = "ListWorkers"}, [&](const Caller&) {
+      *response = workers_.ListWorkers();
+      return grpc::Status::OK;
+    });
   }
 
  private:
-  absl::Status Upload(grpc::ServerReader<v1::UploadSceneFileRequest>& reader) {
+  // Where nobody shows a key, callers are told apart by where they are.
+  std::string NameFor(const Caller& caller) const { return gate_.is_open() ? caller.address : caller.user; }
+
+  absl::Status Upload(const Caller& caller, grpc::ServerReader<v1::UploadSceneFileRequest>& reader) {
     v1::UploadSceneFileRequest request;
     if (!reader.Read(&request) || !request.has_header()) {
       return absl::InvalidArgumentError("header: expected in the first message");
     }
-    MW_ASSIGN_OR_RETURN(SceneFileUpload upload, service_.BeginUpload(request.header()));
+    const std::string& id = request.header().reconstruction_id();
+    MW_RETURN_IF_ERROR(
+        gate_.Check(caller, {.action = Action::kChange, .deed = "UploadSceneFile", .reconstruction = id}));
+    const v1::UploadSceneFileRequest::Header header = request.header();
+    MW_ASSIGN_OR_RETURN(SceneFileUpload upload, service_.BeginUpload(header));
+    MW_RETURN_IF_ERROR(gate_.ReserveSceneBytes(header.reconstruction_id(), header.path(), header.size_bytes()));
+    const auto release = absl::MakeCleanup([&] { gate_.ReleaseSceneBytes(header.reconstruction_id(), header.path()); });
     while (reader.Read(&request)) {
       if (!request.has_chunk()) return absl::InvalidArgumentError("chunk: expected in all messages but the first");
       MW_RETURN_IF_ERROR(upload.Append(request.chunk()));
@@ -189,9 +220,10 @@ class ReconstructionServiceImpl final : public v1::ReconstructionService::Servic
     return upload.Finish();
   }
 
-  const Guard& guard_;
   ReconstructionService& service_;
   WorkerService& workers_;
+  Gatekeeper& gate_;
+  LongCalls long_calls_{kMaxLongCalls, kMaxLongCallsOfOne};
 };
 
 // A call that waits for work waits without a thread of its own: the service answers it when there is something to say.
@@ -233,28 +265,30 @@ class WaitingWorker final : public grpc::ServerUnaryReactor {
 
 class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Synchronize<v1::WorkerService::Service> {
  public:
-  WorkerServiceImpl(const Guard& guard, WorkerService& service, BlobStore& blobs, std::string staging_folder)
-      : guard_(guard), service_(service), blobs_(blobs), staging_folder_(std::move(staging_folder)) {}
+  WorkerServiceImpl(WorkerService& service, BlobStore& blobs, std::string staging_folder, Gatekeeper& gate)
+      : service_(service), blobs_(blobs), staging_folder_(std::move(staging_folder)), gate_(gate) {}
 
   grpc::ServerUnaryReactor* Synchronize(grpc::CallbackServerContext* context, const v1::SynchronizeRequest* request,
                                         v1::SynchronizeResponse* response) override {
-    if (!guard_.Admits(*context)) {
-      grpc::ServerUnaryReactor* const refusal = context->DefaultReactor();
-      refusal->Finish(Refused());
-      return refusal;
+    if (const auto caller = Enter(gate_, *context, {.action = Action::kWork, .deed = "Synchronize"}); !caller.ok()) {
+      grpc::ServerUnaryReactor* const refused = context->DefaultReactor();
+      refused->Finish(ToGrpc(caller.status()));
+      return refused;
     }
     return new WaitingWorker(service_, *request, *response);
   }
   grpc::Status FetchBlob(grpc::ServerContext* context, const v1::FetchBlobRequest* request,
                          grpc::ServerWriter<v1::FetchBlobResponse>* writer) override {
-    if (!guard_.Admits(*context)) return Refused();
-    const absl::StatusOr<std::string> bytes = blobs_.Get(request->digest());
-    return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
+    return Guarded(gate_, *context, {.action = Action::kWork, .deed = "FetchBlob"}, [&](const Caller&) {
+      const absl::StatusOr<std::string> bytes = blobs_.Get(request->digest());
+      return ToGrpc(bytes.ok() ? SendBytes(*bytes, *writer) : bytes.status());
+    });
   }
   grpc::Status PutBlob(grpc::ServerContext* context, grpc::ServerReader<v1::PutBlobRequest>* reader,
                        v1::PutBlobResponse* response) override {
-    if (!guard_.Admits(*context)) return Refused();
-    return Answer(Put(*reader), [&](const std::string& digest) { response->set_digest(digest); });
+    return Guarded(gate_, *context, {.action = Action::kWork, .deed = "PutBlob"}, [&](const Caller&) {
+      return Answer(Put(*reader), [&](const std::string& digest) { response->set_digest(digest); });
+    });
   }
 
  private:
@@ -284,28 +318,40 @@ class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Syn
     return expected;
   }
 
-  const Guard& guard_;
   WorkerService& service_;
   BlobStore& blobs_;
   const std::string staging_folder_;
+  Gatekeeper& gate_;
 };
+
+std::shared_ptr<grpc::ServerCredentials> CredentialsOf(const GrpcServerOptions& options) {
+  if (options.tls_certificate_file.empty()) return grpc::InsecureServerCredentials();
+  const auto provider = std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(
+      options.tls_key_file, options.tls_certificate_file, kReadCertificatesEverySeconds);
+  grpc::experimental::TlsServerCredentialsOptions tls(provider);
+  tls.watch_identity_key_cert_pairs();
+  return grpc::experimental::TlsServerCredentials(tls);
+}
 
 class RealGrpcServer final : public GrpcServer {
  public:
-  RealGrpcServer(const std::string& token, ReconstructionService& reconstructions, WorkerService& workers,
-                 BlobStore& blobs)
-      : guard_(token),
-        reconstructions_(reconstructions),
+  RealGrpcServer(ReconstructionService& reconstructions, WorkerService& workers, BlobStore& blobs, Gatekeeper& gate)
+      : reconstructions_(reconstructions),
         workers_(workers),
-        reconstruction_service_impl_(guard_, reconstructions, workers),
-        worker_service_impl_(guard_, workers, blobs, reconstructions.staging_folder()) {}
+        reconstruction_service_impl_(reconstructions, workers, gate),
+        worker_service_impl_(workers, blobs, reconstructions.staging_folder(), gate),
+        access_service_(MakeAccessService(gate)) {}
   ~RealGrpcServer() override { Shutdown(absl::Seconds(1)); }
 
-  absl::Status Listen(const std::string& address, GrpcServer::Interceptors interceptors) {
+  absl::Status Listen(const GrpcServerOptions& options, GrpcServer::Interceptors interceptors) {
     grpc::EnableDefaultHealthCheckService(true);
-    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    if (options.reflection) grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
-    builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port_);
+    builder.AddListeningPort(options.listen, CredentialsOf(options), &port_);
+    // Beyond these, calls are answered with ResourceExhausted.
+    grpc::ResourceQuota quota;
+    quota.SetMaxThreads(kMaxThreads);
+    builder.SetResourceQuota(quota);
     // Two coordinators on one port would each get half of the calls.
     builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
     builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5000);
@@ -313,9 +359,10 @@ class RealGrpcServer final : public GrpcServer {
     if (!interceptors.empty()) builder.experimental().SetInterceptorCreators(std::move(interceptors));
     builder.RegisterService(&reconstruction_service_impl_);
     builder.RegisterService(&worker_service_impl_);
+    builder.RegisterService(access_service_.get());
     server_ = builder.BuildAndStart();
     if (server_ == nullptr || port_ == 0) {
-      return absl::UnavailableError(absl::StrCat("cannot listen on ", address));
+      return absl::UnavailableError(absl::StrCat("cannot listen on ", options.listen));
     }
     return absl::OkStatus();
   }
@@ -332,23 +379,23 @@ class RealGrpcServer final : public GrpcServer {
   }
 
  private:
-  const Guard guard_;
   ReconstructionService& reconstructions_;
   WorkerService& workers_;
   ReconstructionServiceImpl reconstruction_service_impl_;
   WorkerServiceImpl worker_service_impl_;
+  const std::unique_ptr<grpc::Service> access_service_;
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;
 };
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const std::string& address, const std::string& token,
+absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const GrpcServerOptions& options,
                                                               ReconstructionService& reconstructions,
                                                               WorkerService& workers, BlobStore& blobs,
-                                                              Interceptors interceptors) {
-  auto server = std::make_unique<RealGrpcServer>(token, reconstructions, workers, blobs);
-  MW_RETURN_IF_ERROR(server->Listen(address, std::move(interceptors)));
+                                                              Gatekeeper& gate, Interceptors interceptors) {
+  auto server = std::make_unique<RealGrpcServer>(reconstructions, workers, blobs, gate);
+  MW_RETURN_IF_ERROR(server->Listen(options, std::move(interceptors)));
   return server;
 }
 

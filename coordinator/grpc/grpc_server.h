@@ -10,20 +10,27 @@
 
 #include "common/blob/blob_store.h"
 #include "coordinator/api/reconstruction_service.h"
+#include "coordinator/auth/gatekeeper.h"
 #include "coordinator/dispatch/worker_service.h"
 
 namespace meshwright {
 
-// ReconstructionService, WorkerService, health and reflection on one port: a thin shell over the logic.
+struct GrpcServerOptions {
+  std::string listen;                // "host:port"; port 0 takes a free one
+  std::string tls_certificate_file;  // PEM, read again when it changes; "": no TLS
+  std::string tls_key_file;          // PEM
+  bool reflection = false;           // tell everybody which calls there are
+};
+
+// ReconstructionService, WorkerService, AccessService, health and reflection on one port: a thin shell over the logic.
 class GrpcServer {
  public:
   using Interceptors = std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>>;
 
-  // `address`: "host:port"; port 0 takes a free one. `token`: what every call but those of health and reflection has to
-  // show, as metadata "authorization: Bearer TOKEN"; "": nothing. All of it outlives the server.
-  static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(const std::string& address, const std::string& token,
+  // All of it outlives the server.
+  static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(const GrpcServerOptions& options,
                                                            ReconstructionService& reconstructions,
-                                                           WorkerService& workers, BlobStore& blobs,
+                                                           WorkerService& workers, BlobStore& blobs, Gatekeeper& gate,
                                                            Interceptors interceptors = {});
   virtual ~GrpcServer() = default;
   virtual int port() const = 0;

@@ -1,10 +1,12 @@
 #include "coordinator/main/check_settings.h"
 
 #include <filesystem>
+#include <utility>
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
+#include "common/base/files.h"
 #include "common/base/host_port.h"
 #include "common/base/status_macros.h"
 #include "common/base/token_file.h"
@@ -42,6 +44,23 @@ absl::Status CheckPage(const std::string& folder) {
   return absl::InvalidArgumentError(absl::StrCat("--dashboard is ", folder, ", which has no index.html"));
 }
 
+// Who opens the service to other machines says who may use it.
+absl::Status CheckExposure(const CoordinatorSettings& settings) {
+  if (!settings.api_token_file.empty() || settings.insecure) return absl::OkStatus();
+  for (const auto& [flag, address] :
+       {std::pair("--listen", settings.listen), std::pair("--rest-listen", settings.rest_listen),
+        std::pair("--nodeodm-listen", settings.nodeodm_listen)}) {
+    if (address.empty()) continue;
+    MW_ASSIGN_OR_RETURN(const HostPort listen, ParseHostPort(address, flag));
+    if (IsLoopbackHost(listen.host)) continue;
+    return absl::InvalidArgumentError(
+        absl::StrCat(flag, " is ", address,
+                     ", which other machines reach, and nobody would "
+                     "have to show a key: expected --api-token-file FILE, or --insecure"));
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status CheckSettings(const CoordinatorSettings& settings) {
@@ -66,8 +85,19 @@ absl::Status CheckSettings(const CoordinatorSettings& settings) {
     }
   }
   MW_RETURN_IF_ERROR(ReadTokenFile(settings.webhook_secret_file, "--webhook-secret-file").status());
-  MW_RETURN_IF_ERROR(ReadTokenFile(settings.grpc_token_file, "--grpc-token-file").status());
-  return ReadTokenFile(settings.api_token_file, "--api-token-file").status();
+  if (settings.tls_certificate_file.empty() != settings.tls_key_file.empty()) {
+    return absl::InvalidArgumentError("--tls-cert and --tls-key: expected both or none");
+  }
+  for (const std::string& file : {settings.tls_certificate_file, settings.tls_key_file}) {
+    if (!file.empty()) MW_RETURN_IF_ERROR(ReadFile(file).status());
+  }
+  MW_RETURN_IF_ERROR(ReadTokenFile(settings.api_token_file, "--api-token-file").status());
+  MW_RETURN_IF_ERROR(ReadTokenFile(settings.worker_token_file, "--worker-token-file").status());
+  if (settings.api_token_file.empty() && !settings.worker_token_file.empty()) {
+    return absl::InvalidArgumentError(
+        "--worker-token-file: expected with --api-token-file, or nobody is asked for a key");
+  }
+  return CheckExposure(settings);
 }
 
 }  // namespace meshwright

@@ -36,20 +36,42 @@ void AddRestOptions(CLI::App& program, CoordinatorSettings& settings) {
                                        "file with the secret that what is told is signed with"));
   NameInEnvironment(program.add_option("--dashboard", settings.page_folder,
                                        "folder with the dashboard's files [where they are installed]"));
-  NameInEnvironment(program.add_option("--api-token-file", settings.api_token_file,
-                                       "file with the token that callers over HTTP have to show [none is asked for]"));
+  AddAccessOptions(program, settings);
+}
+
+void AddAccessOptions(CLI::App& program, CoordinatorSettings& settings) {
+  NameInEnvironment(
+      program.add_option("--api-token-file", settings.api_token_file,
+                         "file with the operator's key: whoever calls, over HTTP or gRPC, then has to show "
+                         "this one or one made with it (meshwright token) [nobody has to show a key]"));
+  NameInEnvironment(program.add_option("--worker-token-file", settings.worker_token_file,
+                                       "file with the key that workers join with [each has one made for it]"));
+  NameInEnvironment(program.add_flag("--insecure", settings.insecure,
+                                     "listen also where other machines reach it although nobody has to show a key"));
+  NameInEnvironment(program.add_option("--tls-cert", settings.tls_certificate_file,
+                                       "file with the certificate for gRPC and those above it, PEM; read again when it "
+                                       "changes [no TLS]"));
+  NameInEnvironment(program.add_option("--tls-key", settings.tls_key_file, "file with its key, PEM"));
+  NameInEnvironment(program.add_flag("--grpc-reflection", settings.grpc_reflection,
+                                     "tell everybody over gRPC which calls there are"));
+  NameInEnvironment(
+      program.add_option("--user-reconstructions", settings.user_reconstructions, "that one user may have at a time")
+          ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))
+          ->capture_default_str());
+  NameInEnvironment(program.add_option("--user-gigabytes", settings.user_gigabytes, "that one user may have uploaded")
+                        ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))
+                        ->capture_default_str());
+  NameInEnvironment(program
+                        .add_option("--user-requests-per-second", settings.user_requests_per_second,
+                                    "of one user, on average; who shows no valid key gets a tenth of it")
+                        ->check(CLI::Range(1.0, 1e6))
+                        ->capture_default_str());
 }
 
 void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings) {
-  NameInEnvironment(program
-                        .add_option("--listen", settings.listen,
-                                    "host:port for workers and clients; port 0 takes a free one. Without "
-                                    "--grpc-token-file only listen where everybody is trusted")
-                        ->capture_default_str());
   NameInEnvironment(
-      program.add_option("--grpc-token-file", settings.grpc_token_file,
-                         "file with the token that workers and callers over gRPC have to show [none is asked "
-                         "for]"));
+      program.add_option("--listen", settings.listen, "host:port for workers and clients; port 0 takes a free one")
+          ->capture_default_str());
   NameInEnvironment(program.add_option("--data", settings.data_folder, "folder for state, uploads and meshes"));
   NameInEnvironment(program.add_option(
       "--store", settings.store, "sqlite:PATH or postgresql://USER@HOST:PORT/DATABASE [sqlite in the data folder]"));

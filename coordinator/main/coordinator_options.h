@@ -10,6 +10,8 @@ namespace meshwright {
 void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings);
 // --rest-listen and what belongs to it; AddCoordinatorOptions has them.
 void AddRestOptions(CLI::App& program, CoordinatorSettings& settings);
+// Keys, TLS of gRPC and what one user may have; AddRestOptions has them.
+void AddAccessOptions(CLI::App& program, CoordinatorSettings& settings);
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

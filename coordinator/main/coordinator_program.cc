@@ -27,6 +27,7 @@
 #include "coordinator/dispatch/worker_service.h"
 #include "coordinator/grpc/grpc_server.h"
 #include "coordinator/main/check_settings.h"
+#include "coordinator/main/open_gate.h"
 #include "coordinator/main/open_job_store.h"
 #include "coordinator/main/open_nodeodm.h"
 #include "coordinator/main/open_rest.h"
@@ -122,12 +123,17 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
                                                .conductor_lease = std::min(lease_.lease, kConductorLease),
                                                .ended = [this](const v1::Reconstruction& over) { TellEnd(over); }},
                                               environment, *workers_));
+    MW_ASSIGN_OR_RETURN(gate_, OpenGate(settings_, *store_, clock_, log_, metrics_));
     GrpcServer::Interceptors interceptors;
     interceptors.push_back(MakeRpcMetrics(metrics_));
-    MW_ASSIGN_OR_RETURN(const std::string token, ReadTokenFile(settings_.grpc_token_file, "--grpc-token-file"));
-    MW_ASSIGN_OR_RETURN(server_, GrpcServer::Start(settings_.listen, token, *reconstructions_, *workers_, *blobs_,
-                                                   std::move(interceptors)));
-    MW_ASSIGN_OR_RETURN(rest_server_, OpenRest(settings_, *reconstructions_, *workers_, *blobs_, *store_, log_));
+    MW_ASSIGN_OR_RETURN(server_,
+                        GrpcServer::Start({.listen = settings_.listen,
+                                           .tls_certificate_file = settings_.tls_certificate_file,
+                                           .tls_key_file = settings_.tls_key_file,
+                                           .reflection = settings_.grpc_reflection},
+                                          *reconstructions_, *workers_, *blobs_, *gate_, std::move(interceptors)));
+    MW_ASSIGN_OR_RETURN(rest_server_,
+                        OpenRest(settings_, *reconstructions_, *workers_, *blobs_, *store_, *gate_, log_));
     MW_ASSIGN_OR_RETURN(nodeodm_server_, OpenNodeOdm(settings_, *reconstructions_, *workers_, *blobs_, clock_, log_));
     MW_RETURN_IF_ERROR(ServeMetrics());
     return absl::OkStatus();
@@ -181,6 +187,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
   std::unique_ptr<WebhookSender> webhook_;  // null: none
   std::unique_ptr<WorkerService> workers_;
   std::unique_ptr<ReconstructionService> reconstructions_;
+  std::unique_ptr<Gatekeeper> gate_;
   std::unique_ptr<GrpcServer> server_;
   std::unique_ptr<RestServer> rest_server_;        // null: none
   std::unique_ptr<NodeOdmServer> nodeodm_server_;  // null: none

@@ -25,10 +25,17 @@ struct CoordinatorSettings {
   std::string page_folder;                   // the dashboard's files; "": where they are installed, if they are
   std::string nodeodm_listen;                // host:port for NodeODM's protocol; port 0 takes a free one; "": none
   int nodeodm_max_images = 0;                // of one of its tasks; 0: any number
-  std::string grpc_token_file;               // what workers and callers over gRPC have to show is in it; "": nothing
   std::string webhook_url;                   // where ends of reconstructions are told; "": nowhere
   std::string webhook_secret_file;           // what that is signed with is in it
-  std::string api_token_file;                // what callers over HTTP have to show is in it; "": nothing
+  std::string tls_certificate_file;          // PEM, for gRPC; "": no TLS
+  std::string tls_key_file;                  // PEM
+  bool grpc_reflection = false;
+  std::string api_token_file;     // the operator's key is in it; "": nobody has to show one
+  std::string worker_token_file;  // the key that workers join with; "": each has one of its own
+  bool insecure = false;          // listen where others reach it without asking for keys
+  int64_t user_reconstructions = 1000;
+  int64_t user_gigabytes = 1000;  // uploaded
+  double user_requests_per_second = 200;
   std::string metrics_listen;  // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
 };
 

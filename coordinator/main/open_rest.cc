@@ -6,7 +6,6 @@
 #include "pipeline/options/options_json.h"
 
 #include "common/base/status_macros.h"
-#include "common/base/token_file.h"
 
 namespace meshwright {
 namespace {
@@ -28,7 +27,8 @@ std::string FindPage() {
 
 absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& settings,
                                                      ReconstructionService& reconstructions, WorkerService& workers,
-                                                     BlobStore& blobs, JobStore& store, const Logger& log) {
+                                                     BlobStore& blobs, JobStore& store, Gatekeeper& gate,
+                                                     const Logger& log) {
   if (settings.rest_listen.empty()) return nullptr;
   RestOptions options = {.listen = settings.rest_listen,
                          .folder = settings.data_folder + "/rest",
@@ -37,10 +37,10 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
   options.tls_key_file = settings.rest_tls_key_file;
   options.trusted_proxies = {settings.trusted_proxies.begin(), settings.trusted_proxies.end()};
   options.warn = [&log](const std::string& text) { log.Warning(text); };
-  MW_ASSIGN_OR_RETURN(options.token, ReadTokenFile(settings.api_token_file, "--api-token-file"));
   RestServices services = {.reconstructions = &reconstructions,
                            .workers = &workers,
                            .blobs = &blobs,
+                           .gate = &gate,
                            .options_json = DescribeOptionsForRest()};
   services.ready = [&blobs, &store]() -> absl::Status {
     MW_RETURN_IF_ERROR(store.Now().status());

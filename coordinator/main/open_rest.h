@@ -7,6 +7,7 @@
 #include "common/blob/blob_store.h"
 #include "common/telemetry/log.h"
 #include "coordinator/api/reconstruction_service.h"
+#include "coordinator/auth/gatekeeper.h"
 #include "coordinator/dispatch/worker_service.h"
 #include "coordinator/main/coordinator_program.h"
 #include "coordinator/rest/rest_server.h"
@@ -18,7 +19,8 @@ namespace meshwright {
 // setting. `log` outlives it.
 absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& settings,
                                                      ReconstructionService& reconstructions, WorkerService& workers,
-                                                     BlobStore& blobs, JobStore& store, const Logger& log);
+                                                     BlobStore& blobs, JobStore& store, Gatekeeper& gate,
+                                                     const Logger& log);
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -20,6 +21,15 @@ absl::Status Say(RestCall& call, const std::string& text, const char* type) {
   return absl::OkStatus();
 }
 
+// A key that a browser showed once comes back as a cookie that no script can read.
+absl::Status SetSession(RestCall& call, const std::string& key) {
+  const bool secure = call.request.is_tls || call.request.headers.Get("X-Forwarded-Proto") == "https";
+  call.response.headers.Set("Set-Cookie", absl::StrCat("meshwright-token=", key, "; HttpOnly; SameSite=Strict; Path=/",
+                                                       key.empty() ? "; Max-Age=0" : "", secure ? "; Secure" : ""));
+  call.response.status = 204;
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 void AddClusterRoutes(const RestContext& context, std::vector<Route>& routes) {
@@ -33,6 +43,12 @@ void AddClusterRoutes(const RestContext& context, std::vector<Route>& routes) {
     call.response.status = 204;
     return absl::OkStatus();
   });
+  add("POST", "/v1/session", [&context](RestCall& call) {
+    // It was found to be valid; where none is asked for, none is kept.
+    const std::string header = context.gate->is_open() ? "" : call.request.headers.Get("Authorization");
+    return SetSession(call, header.substr(std::min(header.size(), sizeof("Bearer ") - 1)));
+  });
+  add("DELETE", "/v1/session", [](RestCall& call) { return SetSession(call, ""); });
   add("GET", "/v1/options", [&context](RestCall& call) { return Say(call, context.options_json, kJsonType); });
   add("GET", "/v1/openapi.yaml",
       [](RestCall& call) { return Say(call, RestDescriptions().front().second, "application/yaml"); });

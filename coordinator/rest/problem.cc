@@ -11,6 +11,8 @@
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 
+#include "coordinator/api/public_text.h"
+
 namespace meshwright {
 namespace {
 
@@ -21,7 +23,7 @@ struct HttpTitle {
   int status;
   const char* title;
 };
-constexpr std::array<HttpTitle, 20> kTitles = {{{400, "Bad Request"},
+constexpr std::array<HttpTitle, 21> kTitles = {{{400, "Bad Request"},
                                                 {401, "Unauthorized"},
                                                 {403, "Forbidden"},
                                                 {404, "Not Found"},
@@ -40,7 +42,8 @@ constexpr std::array<HttpTitle, 20> kTitles = {{{400, "Bad Request"},
                                                 {500, "Internal Server Error"},
                                                 {501, "Not Implemented"},
                                                 {503, "Service Unavailable"},
-                                                {504, "Gateway Timeout"}}};
+                                                {504, "Gateway Timeout"},
+                                                {507, "Insufficient Storage"}}};
 
 const char* TitleOf(int http_status) {
   for (const HttpTitle& title : kTitles) {
@@ -138,7 +141,7 @@ std::string ProblemJson(const absl::Status& status) {
   problem["type"] = "about:blank";
   problem["title"] = TitleOf(http_status);
   problem["status"] = http_status;
-  problem["detail"] = std::string(status.message());
+  problem["detail"] = WithoutServerPaths(std::string(status.message()));
   problem["code"] = absl::StatusCodeToString(status.code());
   if (const std::optional<std::string> field = FieldOf(status)) problem["field"] = *field;
   // Messages quote what came from outside, which need not be text.

@@ -6,6 +6,7 @@
 #include <absl/types/span.h>
 
 #include "common/base/status_macros.h"
+#include "coordinator/api/guarded_calls.h"
 #include "coordinator/rest/camera_json.h"
 #include "coordinator/rest/json.h"
 #include "coordinator/rest/problem.h"
@@ -42,7 +43,7 @@ absl::Status Create(const RestContext& context, RestCall& call) {
       [&context, body](RestCall& taken) -> absl::Status {
         v1::CreateReconstructionRequest request;
         MW_RETURN_IF_ERROR(FromJson(*body, request));
-        return Answer(taken, context.reconstructions->Create(request));
+        return Answer(taken, CreateFor(taken.caller, *context.gate, *context.reconstructions, request));
       });
 }
 
@@ -51,7 +52,8 @@ absl::Status List(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const int64_t page_size, QueryNumber(call, "pageSize", 0, 1000, 0));
   request.set_page_size(static_cast<int32_t>(page_size));
   request.set_page_token(call.request.Param("pageToken"));
-  MW_ASSIGN_OR_RETURN(const v1::ListReconstructionsResponse response, context.reconstructions->List(request));
+  MW_ASSIGN_OR_RETURN(const v1::ListReconstructionsResponse response,
+                      ListFor(call.caller, *context.reconstructions, request));
   call.response.SetContent(ToJson(response), kJsonType);
   return absl::OkStatus();
 }
@@ -59,6 +61,7 @@ absl::Status List(const RestContext& context, RestCall& call) {
 absl::Status Delete(const RestContext& context, RestCall& call) {
   MW_RETURN_IF_ERROR(context.reconstructions->Delete(call.path.at("id")));
   context.uploads->Sweep();
+  context.gate->ReleaseSceneBytes(call.path.at("id"));
   call.response.status = 204;
   return absl::OkStatus();
 }
@@ -66,6 +69,7 @@ absl::Status Delete(const RestContext& context, RestCall& call) {
 absl::Status Start(const RestContext& context, RestCall& call) {
   MW_RETURN_IF_ERROR(Answer(call, context.reconstructions->Start(call.path.at("id"))));
   context.uploads->Sweep();
+  context.gate->ReleaseSceneBytes(call.path.at("id"));
   return absl::OkStatus();
 }
 
@@ -84,7 +88,9 @@ absl::StatusOr<int64_t> LastPart(const RestCall& call) {
 
 absl::Status Events(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const int64_t last_part, LastPart(call));
-  auto opened = context.feeds->Open(call.path.at("id"), call.request.caller, last_part);
+  // One user's streams are counted together, wherever they come from.
+  const std::string& follower = context.gate->is_open() ? call.request.caller : call.caller.user;
+  auto opened = context.feeds->Open(call.path.at("id"), follower, last_part);
   if (absl::IsUnavailable(opened.status()) || absl::IsResourceExhausted(opened.status()))
     call.response.headers.Set("Retry-After", "5");
   MW_RETURN_IF_ERROR(opened.status());

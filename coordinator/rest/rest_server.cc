@@ -1,15 +1,17 @@
 #include "coordinator/rest/rest_server.h"
 
 #include <algorithm>
+#include <optional>
 #include <thread>
 #include <utility>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 #include <absl/strings/strip.h>
 
-#include "common/base/digest.h"
+#include "common/base/host_port.h"
 #include "common/base/status_macros.h"
 #include "common/http_server/http_server.h"
 #include "coordinator/rest/problem.h"
@@ -20,27 +22,61 @@ namespace meshwright {
 namespace {
 
 constexpr char kTokenCookie[] = "meshwright-token";
+// Pages of other sites cannot send it without asking first, and nobody answers that they may.
+constexpr char kCsrfHeader[] = "X-Meshwright-Csrf";
+constexpr char kSessionPath[] = "/v1/session";
 constexpr char kRetryAfterSeconds[] = "1";
 constexpr int kMinWorkers = 4;
 constexpr absl::Duration kShutdownGrace = absl::Seconds(2);
 
-std::string TokenOf(const HttpRequest& request) {
+struct ShownKey {
+  std::string text;
+  bool by_cookie = false;  // the browser sends it by itself, whichever page asks
+};
+
+ShownKey KeyOf(const HttpRequest& request) {
   const std::string header = request.headers.Get("Authorization");
   constexpr char kBearer[] = "Bearer ";
-  if (absl::StartsWith(header, kBearer)) return header.substr(sizeof(kBearer) - 1);
+  if (absl::StartsWith(header, kBearer)) return {.text = header.substr(sizeof(kBearer) - 1)};
   for (absl::string_view cookie : absl::StrSplit(request.headers.Get("Cookie"), ';')) {
     cookie = absl::StripAsciiWhitespace(cookie);
-    if (absl::ConsumePrefix(&cookie, kTokenCookie) && absl::ConsumePrefix(&cookie, "=")) return std::string(cookie);
+    if (absl::ConsumePrefix(&cookie, kTokenCookie) && absl::ConsumePrefix(&cookie, "=")) {
+      return {.text = std::string(cookie), .by_cookie = true};
+    }
   }
-  return "";
+  return {};
 }
+
+bool OnlyReads(const HttpRequest& request) { return request.method == "GET" || request.method == "HEAD"; }
 
 // Whether the request is another site's doing, in the browser of somebody who can reach this one.
 bool IsForeign(const HttpRequest& request) {
-  if (request.method == "GET" || request.method == "HEAD") return false;
+  if (OnlyReads(request)) return false;
   const std::string origin = request.headers.Get("Origin");
   const size_t host = origin.find("://");
   return !origin.empty() && (host == std::string::npos || origin.substr(host + 3) != request.headers.Get("Host"));
+}
+
+// Whether the request came by a name of the Internet's that somebody lets mean this machine (DNS rebinding). Who
+// listens on the loopback alone has none; behind a proxy the name may be the proxy's.
+bool IsRebound(const HttpRequest& request, const RestOptions& options) {
+  const absl::StatusOr<HostPort> listen = ParseHostPort(options.listen, "listen");
+  if (!options.trusted_proxies.empty() || !listen.ok() || !IsLoopbackHost(listen->host)) return false;
+  const std::string host = request.headers.Get("Host");
+  const std::string name = absl::AsciiStrToLower(host.substr(0, host.find(':')));
+  const bool is_address = host.find_first_not_of("0123456789.:") == std::string::npos || absl::StartsWith(host, "[");
+  return !is_address && absl::StrContains(name, '.') && !absl::EndsWith(name, ".localhost");
+}
+
+// What a route is for, of those that are about somebody's reconstructions or the service; nothing for those that any
+// valid key opens.
+std::optional<Action> ActionOf(const Route& route) {
+  const bool reads = route.method == "GET";
+  if (route.path == "/v1/reconstructions") return reads ? Action::kList : Action::kCreate;
+  if (absl::StartsWith(route.path, "/v1/reconstructions/")) return reads ? Action::kRead : Action::kChange;
+  if (absl::StartsWith(route.path, "/v1/workers")) return reads ? Action::kInspect : Action::kOperate;
+  if (reads || route.path == kSessionPath) return std::nullopt;
+  return Action::kOperate;
 }
 
 void AddDefaultHeaders(HttpResponse& response) {
@@ -50,11 +86,11 @@ void AddDefaultHeaders(HttpResponse& response) {
 
 class RealRestServer final : public RestServer, private HttpHandler {
  public:
-  RealRestServer(const RestOptions& options, const RestServices& services)
-      : options_(options), token_digest_(Sha256Hex(options.token)) {
+  RealRestServer(const RestOptions& options, const RestServices& services) : options_(options) {
     context_.reconstructions = services.reconstructions;
     context_.workers = services.workers;
     context_.blobs = services.blobs;
+    context_.gate = services.gate;
     context_.ready = services.ready;
     context_.options_json = services.options_json;
   }
@@ -115,22 +151,44 @@ class RealRestServer final : public RestServer, private HttpHandler {
   absl::Status Answer(RestCall& call) {
     const HttpRequest& request = call.request;
     const bool for_interface = request.path == "/v1" || absl::StartsWith(request.path, "/v1/");
-    if (for_interface && !options_.token.empty() && Sha256Hex(TokenOf(request)) != token_digest_) {
-      return absl::UnauthenticatedError("the header Authorization is not the one expected: Bearer and the token");
+    if (IsRebound(request, options_)) {
+      return FieldError("Host", absl::PermissionDeniedError("Host is no name of this machine, expected localhost"));
     }
+    if (for_interface) MW_RETURN_IF_ERROR(Identify(call));
     if (IsForeign(request)) {
       return FieldError("Origin", absl::PermissionDeniedError("Origin is another site, expected this one or none"));
     }
     const absl::StatusOr<const Route*> route = router_->Match(call);
-    if (route.ok()) return (*route)->handler(call);
+    if (route.ok()) {
+      if (for_interface) MW_RETURN_IF_ERROR(Authorize(call, **route));
+      return (*route)->handler(call);
+    }
     if (!absl::IsNotFound(route.status()) || for_interface || (request.method != "GET" && request.method != "HEAD")) {
       return route.status();
     }
     return SendPage(call, options_.page_folder);
   }
 
+  absl::Status Identify(RestCall& call) {
+    const ShownKey key = KeyOf(call.request);
+    MW_ASSIGN_OR_RETURN(call.caller, context_.gate->Identify(key.text, call.request.caller));
+    if (key.by_cookie && !OnlyReads(call.request) && !call.request.headers.Has(kCsrfHeader)) {
+      return FieldError(kCsrfHeader, absl::PermissionDeniedError(absl::StrCat(
+                                         kCsrfHeader, " is missing, expected with a key that comes as a cookie")));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Authorize(const RestCall& call, const Route& route) {
+    const std::optional<Action> action = ActionOf(route);
+    if (!action) return absl::OkStatus();
+    const auto id = call.path.find("id");
+    return context_.gate->Check(call.caller, {.action = *action,
+                                              .deed = absl::StrCat(route.method, " ", route.path),
+                                              .reconstruction = id == call.path.end() ? "" : id->second});
+  }
+
   const RestOptions options_;
-  const std::string token_digest_;
   RestContext context_;
   std::unique_ptr<SceneUploads> uploads_;
   std::unique_ptr<DerivedFiles> derived_;

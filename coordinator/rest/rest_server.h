@@ -10,6 +10,7 @@
 
 #include "common/blob/blob_store.h"
 #include "coordinator/api/reconstruction_service.h"
+#include "coordinator/auth/gatekeeper.h"
 #include "coordinator/dispatch/worker_service.h"
 
 namespace meshwright {
@@ -18,7 +19,6 @@ struct RestOptions {
   std::string listen;                     // "host:port"; port 0 takes a free one
   std::string folder;                     // uploads that are not complete, converted meshes
   std::string page_folder;                // the dashboard's files; "": none
-  std::string token;                      // that callers have to show; "": none
   std::string tls_certificate_file;       // PEM, read again when it changes; "": no TLS
   std::string tls_key_file;               // PEM
   std::set<std::string> trusted_proxies;  // addresses whose X-Forwarded-For is believed
@@ -34,6 +34,7 @@ struct RestServices {
   ReconstructionService* reconstructions = nullptr;
   WorkerService* workers = nullptr;
   BlobStore* blobs = nullptr;
+  Gatekeeper* gate = nullptr;
   std::function<absl::Status()> ready;  // whether store and blobs can be reached
   std::string options_json;             // the answer of GET /v1/options
 };

@@ -77,7 +77,7 @@ class RestBody final : public HttpBodySink {
  public:
   RestBody(const RestCall& call, int64_t most, std::function<absl::Status(absl::Span<const uint8_t>)> take,
            std::function<absl::Status(RestCall&)> finish)
-      : call_{.request = call.request, .response = call.response, .path = call.path},
+      : call_{.request = call.request, .response = call.response, .path = call.path, .caller = call.caller},
         most_(most),
         take_(std::move(take)),
         finish_(std::move(finish)) {}
@@ -163,6 +163,7 @@ void AnswerStatus(const absl::Status& status, HttpResponse& response) {
   if (status.ok()) return;
   response.status = HttpStatusOf(status);
   if (response.status == 401) response.headers.Set("WWW-Authenticate", "Bearer");
+  if (response.status == 429 && !response.headers.Has("Retry-After")) response.headers.Set("Retry-After", "1");
   response.SetContent(ProblemJson(status), "application/problem+json");
 }
 

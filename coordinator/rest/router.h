@@ -11,6 +11,7 @@
 #include <absl/types/span.h>
 
 #include "common/http_server/http_message.h"
+#include "coordinator/auth/access.h"
 
 namespace meshwright {
 
@@ -20,6 +21,7 @@ struct RestCall {
   HttpResponse& response;
   std::map<std::string, std::string> path;  // what stands for {name} in the route's path
   std::unique_ptr<HttpBodySink> body;       // set by TakeBody
+  Caller caller = {};                       // who asks
 };
 
 // Not OK: the answer is the problem.

@@ -8,6 +8,7 @@
 
 #include "common/blob/blob_store.h"
 #include "coordinator/api/reconstruction_service.h"
+#include "coordinator/auth/gatekeeper.h"
 #include "coordinator/dispatch/worker_service.h"
 #include "coordinator/rest/downloads.h"
 #include "coordinator/rest/event_feeds.h"
@@ -21,6 +22,7 @@ struct RestContext {
   ReconstructionService* reconstructions = nullptr;
   WorkerService* workers = nullptr;
   BlobStore* blobs = nullptr;
+  Gatekeeper* gate = nullptr;
   SceneUploads* uploads = nullptr;
   DerivedFiles* derived = nullptr;
   EventFeeds* feeds = nullptr;

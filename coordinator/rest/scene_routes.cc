@@ -69,14 +69,17 @@ absl::Status PutFile(const RestContext& context, RestCall& call) {
   auto begun = context.uploads->Begin(call.path.at("id"), part);
   if (!begun.ok()) return WithOffset(call.response, begun.status());
   const std::shared_ptr<ScenePartUpload> upload = *std::move(begun);
+  const absl::Status has_room = context.gate->ReserveSceneBytes(call.path.at("id"), part.path, part.size_bytes);
+  if (absl::IsResourceExhausted(has_room)) return HttpError(507, has_room);
   return TakeBody(
       call, kMaxPartBytes,
       [upload, &response = call.response](absl::Span<const uint8_t> bytes) {
         return WithOffset(response, upload->Append(bytes));
       },
-      [upload](RestCall& taken) -> absl::Status {
+      [upload, &context](RestCall& taken) -> absl::Status {
         const absl::StatusOr<SceneFileState> file = upload->Finish();
         MW_RETURN_IF_ERROR(WithOffset(taken.response, file.status()));
+        if (file->complete) context.gate->ReleaseSceneBytes(taken.path.at("id"), file->path);
         return Answer(taken, *file);
       });
 }

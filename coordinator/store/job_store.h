@@ -46,6 +46,7 @@ struct Reconstruction {
   double weight = 1;            // its share of the workers, relative to the others'; at least 0.001
   std::string scene_reference;  // "" when the scene is uploaded
   std::string scene_blob;       // the whole scene in the BlobStore; "" until it is there
+  std::string owner;            // the user whose it is; "": nobody's in particular
   absl::Time created_at = absl::UnixEpoch();
   absl::Time finished_at = absl::InfinitePast();  // in a final state only
   StoredMesh mesh;
@@ -205,6 +206,26 @@ struct SceneFile {
   bool operator==(const SceneFile&) const = default;
 };
 
+// A key. Its secret is not here: its owner alone has it.
+struct AccessToken {
+  std::string id;
+  std::string digest;  // SHA-256 of the secret, 64 hexadecimal digits
+  std::string user;
+  std::string role;               // viewer, submitter, operator or worker
+  std::string reconstruction_id;  // a share link: the one that it is for; else ""
+  absl::Time created_at = absl::UnixEpoch();
+  absl::Time expires_at = absl::InfiniteFuture();
+  absl::Time revoked_at = absl::InfiniteFuture();
+
+  bool operator==(const AccessToken&) const = default;
+};
+
+// What a user has.
+struct Usage {
+  int64_t reconstructions = 0;
+  int64_t scene_bytes = 0;  // uploaded
+};
+
 // One line of the only order that counts. Number s exists only when 1 .. s - 1 exist.
 struct Commit {
   SequenceNumber sequence = 0;
@@ -240,6 +261,11 @@ class JobStore {
   // By id, at most `limit` of those whose id is greater than `after`. Without those that are being deleted.
   virtual absl::StatusOr<std::vector<Reconstruction>> ListReconstructions(
       const std::string& after = "", int64_t limit = std::numeric_limits<int64_t>::max()) = 0;
+  // The same, of one owner.
+  virtual absl::StatusOr<std::vector<Reconstruction>> ListReconstructionsOf(const std::string& owner,
+                                                                            const std::string& after,
+                                                                            int64_t limit) = 0;
+  virtual absl::StatusOr<Usage> UsageOf(const std::string& owner) = 0;
   // Gives a reconstruction that does not run yet its scene. Repeating it is OK; FailedPrecondition once it runs.
   virtual absl::Status SetReconstructionScene(const std::string& id, const std::string& scene_digest,
                                               const std::string& scene_blob = "", int64_t conductor_epoch = 0) = 0;
@@ -331,6 +357,13 @@ class JobStore {
   // Of a reconstruction that is being deleted: its blobs that no other one has. Who wants to hold one of them has to
   // wait until the rows are deleted too.
   virtual absl::StatusOr<std::vector<std::string>> MarkBlobsForDeletion(const std::string& id) = 0;
+
+  virtual absl::Status CreateToken(const AccessToken& token) = 0;               // AlreadyExists
+  virtual absl::StatusOr<AccessToken> GetToken(const std::string& id) = 0;      // NotFound
+  virtual absl::StatusOr<std::vector<AccessToken>> ListTokens() = 0;            // the oldest first
+  virtual absl::Status RevokeToken(const std::string& id, absl::Time now) = 0;  // NotFound; the first time counts
+  // Forgets those that were revoked or expired before.
+  virtual absl::Status RemoveDeadTokens(absl::Time before) = 0;
 
   // A blob that somebody could not read, for the conductor to look into.
   virtual absl::Status ReportDamagedBlob(const std::string& id, const std::string& digest) = 0;

@@ -112,6 +112,62 @@ TEST_P(JobStoreConformance, ReconstructionsAreListedById) {
   EXPECT_EQ(all->at(1).id, "castle");
 }
 
+TEST_P(JobStoreConformance, OwnersSeeAndCountTheirOwn) {
+  for (const char* id : {"abbey", "mill", "tower"}) {
+    ASSERT_TRUE(store()
+                    .CreateReconstruction({.id = id,
+                                           .options_json = "{}",
+                                           .state = ReconstructionState::kCreated,
+                                           .owner = std::string(id) == "mill" ? "bob" : "alice"},
+                                          kNow)
+                    .ok());
+  }
+  Reopen();
+  EXPECT_EQ(store().GetReconstruction("abbey")->owner, "alice");
+  EXPECT_EQ(store().GetReconstruction("castle")->owner, "");
+  const auto all = store().ListReconstructionsOf("alice", "", 10);
+  ASSERT_TRUE(all.ok()) << all.status();
+  ASSERT_EQ(all->size(), 2U);
+  EXPECT_EQ(all->at(0).id, "abbey");
+  EXPECT_EQ(store().ListReconstructionsOf("alice", "abbey", 10)->at(0).id, "tower");
+  EXPECT_EQ(store().ListReconstructionsOf("alice", "", 1)->size(), 1U);
+  ASSERT_TRUE(store().PutSceneFile("abbey", {"a", 100, Digest('a')}).ok());
+  ASSERT_TRUE(store().PutSceneFile("tower", {"b", 11, Digest('b')}).ok());
+  ASSERT_TRUE(store().PutSceneFile("mill", {"c", 5, Digest('c')}).ok());
+  EXPECT_EQ(store().UsageOf("alice")->reconstructions, 2);
+  EXPECT_EQ(store().UsageOf("alice")->scene_bytes, 111);
+  ASSERT_TRUE(store().BeginDeletion("tower").ok());
+  EXPECT_EQ(store().UsageOf("alice")->scene_bytes, 100);
+  EXPECT_EQ(store().UsageOf("nobody")->reconstructions, 0);
+}
+
+TEST_P(JobStoreConformance, KeysAreKeptUntilLongAfterTheirEnd) {
+  const AccessToken key = {.id = "k1", .digest = Digest('1'), .user = "alice", .role = "submitter", .created_at = kNow};
+  AccessToken link = {.id = "k2",
+                      .digest = Digest('2'),
+                      .user = "alice",
+                      .role = "viewer",
+                      .reconstruction_id = "castle",
+                      .created_at = kNow + absl::Seconds(1),
+                      .expires_at = kNow + absl::Hours(1)};
+  ASSERT_TRUE(store().CreateToken(link).ok());
+  ASSERT_TRUE(store().CreateToken(key).ok());
+  EXPECT_TRUE(absl::IsAlreadyExists(store().CreateToken(key)));
+  EXPECT_FALSE(store().CreateToken({.id = "k3", .digest = Digest('3'), .user = "x", .role = "king"}).ok());
+  Reopen();
+  EXPECT_THAT(*store().ListTokens(), testing::ElementsAre(key, link));
+  EXPECT_TRUE(absl::IsNotFound(store().GetToken("k4").status()));
+  EXPECT_TRUE(absl::IsNotFound(store().RevokeToken("k4", kNow)));
+  link.revoked_at = kNow + absl::Seconds(2);
+  ASSERT_TRUE(store().RevokeToken("k2", link.revoked_at).ok());
+  ASSERT_TRUE(store().RevokeToken("k2", kNow + absl::Hours(9)).ok());
+  EXPECT_EQ(*store().GetToken("k2"), link);
+  ASSERT_TRUE(store().RemoveDeadTokens(link.revoked_at).ok());
+  EXPECT_EQ(store().ListTokens()->size(), 2U);
+  ASSERT_TRUE(store().RemoveDeadTokens(kNow + absl::Seconds(3)).ok());
+  EXPECT_THAT(*store().ListTokens(), testing::ElementsAre(key));
+}
+
 TEST_P(JobStoreConformance, ReconstructionIdsAreUnique) {
   EXPECT_TRUE(absl::IsAlreadyExists(store().CreateReconstruction(kReconstruction, kNow)));
 }

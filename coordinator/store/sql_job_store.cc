@@ -40,7 +40,18 @@ absl::StatusOr<Reconstruction> ReadReconstruction(const SqlRow& row) {
                              .cameras_in_flight = row.Integer(17),
                              .patches_filtered = row.Integer(18),
                              .patches_accepted = row.Integer(19)};
+  reconstruction.owner = row.Text(20);
   return reconstruction;
+}
+
+absl::StatusOr<std::vector<Reconstruction>> ReadReconstructions(const SqlResult& result) {
+  std::vector<Reconstruction> all;
+  all.reserve(result.rows.size());
+  for (const SqlRow& row : result.rows) {
+    MW_ASSIGN_OR_RETURN(Reconstruction reconstruction, ReadReconstruction(row));
+    all.push_back(std::move(reconstruction));
+  }
+  return all;
 }
 
 Commit ReadCommit(const SqlRow& row) {
@@ -170,7 +181,8 @@ absl::Status SqlJobStore::CreateReconstruction(const Reconstruction& reconstruct
                   {"now", absl::ToUnixMicros(now)},
                   {"reason", PrintableText(reconstruction.state_reason)},
                   {"weight_thousandths", weight},
-                  {"scene_reference", reconstruction.scene_reference}}}})
+                  {"scene_reference", reconstruction.scene_reference},
+                  {"owner", reconstruction.owner}}}})
       .status();
 }
 
@@ -183,13 +195,15 @@ absl::StatusOr<Reconstruction> SqlJobStore::GetReconstruction(const std::string&
 absl::StatusOr<std::vector<Reconstruction>> SqlJobStore::ListReconstructions(const std::string& after, int64_t limit) {
   MW_ASSIGN_OR_RETURN(const SqlResult result,
                       database_->Run("list_reconstructions", {{"after", after}, {"limit", limit}}));
-  std::vector<Reconstruction> all;
-  all.reserve(result.rows.size());
-  for (const SqlRow& row : result.rows) {
-    MW_ASSIGN_OR_RETURN(Reconstruction reconstruction, ReadReconstruction(row));
-    all.push_back(std::move(reconstruction));
-  }
-  return all;
+  return ReadReconstructions(result);
+}
+
+absl::StatusOr<std::vector<Reconstruction>> SqlJobStore::ListReconstructionsOf(const std::string& owner,
+                                                                               const std::string& after,
+                                                                               int64_t limit) {
+  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run("list_reconstructions_of",
+                                                             {{"owner", owner}, {"after", after}, {"limit", limit}}));
+  return ReadReconstructions(result);
 }
 
 absl::Status SqlJobStore::SetReconstructionScene(const std::string& id, const std::string& scene_digest,

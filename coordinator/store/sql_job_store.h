@@ -19,6 +19,9 @@ class SqlJobStore : public JobStore {
   absl::Status CreateReconstruction(const Reconstruction& reconstruction, absl::Time now) override;
   absl::StatusOr<Reconstruction> GetReconstruction(const std::string& id) override;
   absl::StatusOr<std::vector<Reconstruction>> ListReconstructions(const std::string& after, int64_t limit) override;
+  absl::StatusOr<std::vector<Reconstruction>> ListReconstructionsOf(const std::string& owner, const std::string& after,
+                                                                    int64_t limit) override;
+  absl::StatusOr<Usage> UsageOf(const std::string& owner) override;
   absl::Status SetReconstructionScene(const std::string& id, const std::string& scene_digest,
                                       const std::string& scene_blob, int64_t conductor_epoch) override;
   absl::Status SetReconstructionState(const std::string& id, ReconstructionState state, absl::Time now,
@@ -65,6 +68,11 @@ class SqlJobStore : public JobStore {
   absl::StatusOr<std::vector<SceneFile>> ListSceneFiles(const std::string& id) override;
   absl::StatusOr<bool> AddBlobRef(const std::string& id, const std::string& digest) override;
   absl::StatusOr<std::vector<std::string>> MarkBlobsForDeletion(const std::string& id) override;
+  absl::Status CreateToken(const AccessToken& token) override;
+  absl::StatusOr<AccessToken> GetToken(const std::string& id) override;
+  absl::StatusOr<std::vector<AccessToken>> ListTokens() override;
+  absl::Status RevokeToken(const std::string& id, absl::Time now) override;
+  absl::Status RemoveDeadTokens(absl::Time before) override;
   absl::Status ReportDamagedBlob(const std::string& id, const std::string& digest) override;
   absl::StatusOr<std::vector<std::string>> ListDamagedBlobs(const std::string& id) override;
   absl::Status ForgetDamagedBlob(const std::string& id, const std::string& digest) override;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { lazy, Suspense } from 'preact/compat';
 import { useState } from 'preact/hooks';
-import { rememberToken, tokenWanted } from './api/client';
+import { beginSession, tokenWanted } from './api/client';
 import { PageTitle } from './components/pieces';
 import { ReconstructionsPage } from './pages/reconstructions';
 import { linkTo, route } from './router';
@@ -49,19 +49,21 @@ function ThemeButton() {
 
 function TokenForm() {
   const [token, setToken] = useState('');
-  const submit = (event: Event) => {
+  const [refused, setRefused] = useState(false);
+  const submit = async (event: Event) => {
     event.preventDefault();
-    rememberToken(token);
-    location.reload();
+    if (await beginSession(token)) location.reload();
+    else setRefused(true);
   };
   return (
     <form class="card" style={{ padding: '20px', maxWidth: '460px' }} onSubmit={submit}>
-      <PageTitle title="A token is wanted" />
+      <PageTitle title="A key is wanted" />
       <p class="muted" style={{ margin: '6px 0 14px' }}>
-        This coordinator was started with a token file. The token stays in this browser until it is closed.
+        This coordinator asks for a key. It stays in this browser until that is closed.
       </p>
+      {refused && <p role="alert">The coordinator does not know this key.</p>}
       <label>
-        Token
+        Key
         <br />
         <input
           type="password"

@@ -58,6 +58,39 @@ TEST(ServiceTest, TheSurfacesSoFarCanBeFetched) {
   EXPECT_GT(ReadBytes(path).size(), 10'000U);
 }
 
+TEST(ServiceTest, EverybodyShowsAKey) {
+  RunningService service;
+  const std::string root = service.folder() / "root.key";
+  const std::string join = service.folder() / "join.key";
+  WriteBytes(root, "the-operators-key-0123456789\n");
+  WriteBytes(join, "the-workers-key-0123456789\n");
+  const auto coordinator = service.StartCoordinator({"--api-token-file", root, "--worker-token-file", join});
+  const auto key_of = [&](const std::string& user) {
+    const RunResult made = service.Client({"token", "create", "--user", user, "--expires", "1d", "--token-file", root});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    const std::string path = service.folder() / (user + ".key");
+    WriteBytes(path, made.out);
+    return path;
+  };
+  const std::string alice = key_of("alice");
+  const std::string bob = key_of("bob");
+  EXPECT_THAT(service.Client({"status"}).err, testing::HasSubstr("a valid key is missing"));
+  const auto worker = service.StartWorker("w", {"--token-file", join});
+  const RunResult submitted = service.Client(
+      With({"submit", SharedScene("small"), "--id", "small", "--wait", "--token-file", alice}, kQuickOptions));
+  EXPECT_EQ(submitted.exit_code, 0) << submitted.err;
+  EXPECT_THAT(service.Client({"status", "small", "--token-file", bob}).err, testing::HasSubstr("no reconstruction"));
+  const nlohmann::json all = JsonOf(service.Client({"token", "list", "--json", "--token-file", root}));
+  ASSERT_EQ(all["keys"].size(), 2U);
+  EXPECT_EQ(all["keys"][0]["user"], "alice");
+  EXPECT_EQ(all["keys"][0]["role"], "submitter");
+  const std::string id = all["keys"][0]["id"];
+  EXPECT_EQ(service.Client({"token", "revoke", id, "--token-file", root}).exit_code, 0);
+  EXPECT_THAT(service.Client({"status", "small", "--token-file", alice}).err,
+              testing::HasSubstr("a valid key is missing"));
+  EXPECT_EQ(service.Client({"token", "create", "--user", "a", "--expires", "soon", "--token-file", root}).exit_code, 2);
+}
+
 TEST(ServiceTest, ACoordinatorThatIsNotThereIsAFailureInOneLine) {
   const RunResult result = RunMeshwright({"status", "--coordinator", "127.0.0.1:1"});
   EXPECT_EQ(result.exit_code, 1);

@@ -67,16 +67,17 @@ class SlowClientsTest : public testing::Test {
     store_ = *OpenSqliteJobStore(folder_ / "state.sqlite");
     blobs_ = *FilesystemBlobStore::Open(folder_ / "blobs");
     Fill();
+    gate_.emplace(GatekeeperOptions(), *store_, clock_);
     workers_ = std::make_unique<WorkerService>(LeaseOptions(), RetryOptions(), *store_);
     logic_ = *ReconstructionService::Open(
         {.data_folder = folder_ / "data"},
         {.store = store_.get(), .blobs = blobs_.get(), .clock = &clock_, .pool = &pool_}, *workers_);
-    auto server =
-        RestServer::Start({.listen = "127.0.0.1:0",
-                           .folder = folder_ / "rest",
-                           .max_event_streams = kStreams,
-                           .idle_timeout_seconds = kIdleTimeoutSeconds},
-                          {.reconstructions = logic_.get(), .workers = workers_.get(), .blobs = blobs_.get()});
+    auto server = RestServer::Start(
+        {.listen = "127.0.0.1:0",
+         .folder = folder_ / "rest",
+         .max_event_streams = kStreams,
+         .idle_timeout_seconds = kIdleTimeoutSeconds},
+        {.reconstructions = logic_.get(), .workers = workers_.get(), .blobs = blobs_.get(), .gate = &*gate_});
     ASSERT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
   }
@@ -126,6 +127,7 @@ class SlowClientsTest : public testing::Test {
   RealClock clock_;
   ThreadPool pool_{1};
   std::unique_ptr<JobStore> store_;
+  std::optional<Gatekeeper> gate_;
   std::unique_ptr<BlobStore> blobs_;
   std::unique_ptr<WorkerService> workers_;
   std::unique_ptr<ReconstructionService> logic_;

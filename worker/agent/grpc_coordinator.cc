@@ -28,12 +28,12 @@ absl::Status FromGrpc(const grpc::Status& status) {
 
 class RealGrpcCoordinator final : public GrpcCoordinator {
  public:
-  RealGrpcCoordinator(const std::shared_ptr<grpc::Channel>& channel, const std::string& token)
-      : stub_(v1::WorkerService::NewStub(channel)), token_(token) {}
+  RealGrpcCoordinator(const std::shared_ptr<grpc::Channel>& channel, std::string key)
+      : stub_(v1::WorkerService::NewStub(channel)), key_(std::move(key)) {}
 
   absl::StatusOr<v1::SynchronizeResponse> Synchronize(const v1::SynchronizeRequest& request) override {
     grpc::ClientContext context;
-    ShowToken(context);
+    ShowKey(context);
     context.set_deadline(
         std::chrono::system_clock::now() +
         std::chrono::milliseconds(static_cast<int64_t>(1000 * (request.wait_timeout_seconds() + kAnswerSeconds))));
@@ -63,7 +63,7 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
 
   absl::StatusOr<std::string> Put(const std::string& bytes) override {
     grpc::ClientContext context;
-    ShowToken(context);
+    ShowKey(context);
     context.set_deadline(std::chrono::system_clock::now() + kBlobDeadline);
     v1::PutBlobResponse response;
     const auto writer = stub_->PutBlob(&context, &response);
@@ -82,7 +82,7 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
   absl::StatusOr<std::string> Get(const std::string& digest) override {
     MW_RETURN_IF_ERROR(ValidateDigest(digest));
     grpc::ClientContext context;
-    ShowToken(context);
+    ShowKey(context);
     context.set_deadline(std::chrono::system_clock::now() + kBlobDeadline);
     v1::FetchBlobRequest request;
     request.set_digest(digest);
@@ -105,12 +105,12 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
   }
 
  private:
-  void ShowToken(grpc::ClientContext& context) const {
-    if (!token_.empty()) context.AddMetadata("authorization", absl::StrCat("Bearer ", token_));
+  void ShowKey(grpc::ClientContext& context) const {
+    if (!key_.empty()) context.AddMetadata("authorization", absl::StrCat("Bearer ", key_));
   }
 
   const std::unique_ptr<v1::WorkerService::Stub> stub_;
-  const std::string token_;
+  const std::string key_;
   Mutex mutex_;
   grpc::ClientContext* waiting_ ABSL_GUARDED_BY(mutex_) = nullptr;
   bool interrupted_ ABSL_GUARDED_BY(mutex_) = false;
@@ -118,7 +118,8 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
 
 }  // namespace
 
-std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& address, const std::string& token) {
+std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& address,
+                                                          const CoordinatorCredentials& credentials) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10'000);
@@ -126,7 +127,12 @@ std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& add
   // A coordinator that was started anew is found within seconds.
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2'000);
   return std::make_unique<RealGrpcCoordinator>(
-      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments), token);
+      grpc::CreateCustomChannel(address,
+                                credentials.ca_certificates.empty()
+                                    ? grpc::InsecureChannelCredentials()
+                                    : grpc::SslCredentials({.pem_root_certs = credentials.ca_certificates}),
+                                arguments),
+      credentials.key);
 }
 
 }  // namespace meshwright

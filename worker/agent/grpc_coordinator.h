@@ -8,13 +8,18 @@
 
 namespace meshwright {
 
+struct CoordinatorCredentials {
+  std::string key;              // "": none is shown
+  std::string ca_certificates;  // PEM, of those who may vouch for the coordinator; "": no TLS
+};
+
 // A coordinator at "host:port", as a WorkerChannel, and as a BlobStore for workers that reach no other: Put and Get
 // stream through it; Has and Delete are Unimplemented, workers need neither. Thread-safe. Connects when it is used
 // first, and again whenever the connection breaks.
 class GrpcCoordinator : public WorkerChannel, public BlobStore {
  public:
-  // `token`: what the coordinator asks for; "": nothing.
-  static std::unique_ptr<GrpcCoordinator> Connect(const std::string& address, const std::string& token = "");
+  static std::unique_ptr<GrpcCoordinator> Connect(const std::string& address,
+                                                  const CoordinatorCredentials& credentials = {});
 };
 
 }  // namespace meshwright

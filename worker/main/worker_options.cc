@@ -6,12 +6,15 @@ namespace meshwright {
 
 void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {
   NameInEnvironment(program.add_option("--coordinator", settings.coordinator, "its host:port")->capture_default_str());
-  NameInEnvironment(program.add_option("--grpc-token-file", settings.grpc_token_file,
-                                       "file with the token that the coordinator asks for [none]"));
   NameInEnvironment(program.add_option("--worker-id", settings.id, "unique [host name and process]"));
   NameInEnvironment(program.add_option(
       "--blobs", settings.blobs,
       "the coordinator's folder of blobs where it is shared, or s3://BUCKET/PREFIX [through the coordinator]"));
+  NameInEnvironment(
+      program.add_option("--token-file", settings.token_file, "file with the key to join with [none is shown]"));
+  NameInEnvironment(program.add_option(
+      "--ca-file", settings.ca_file,
+      "file with the certificates of those who may vouch for the coordinator, PEM; turns TLS on [no TLS]"));
   NameInEnvironment(program.add_option("--cores", settings.cores, "jobs at the same time, and cores for all of them")
                         ->check(CLI::Range(1, 1024))
                         ->capture_default_str());

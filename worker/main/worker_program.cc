@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <utility>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <unistd.h>
 
 #include "common/base/clock.h"
+#include "common/base/files.h"
 #include "common/base/host_port.h"
 #include "common/base/status_macros.h"
-#include "common/base/token_file.h"
 #include "common/blob/open_blob_store.h"
 #include "common/telemetry/log.h"
 #include "common/telemetry/measured_blob_store.h"
@@ -26,6 +27,18 @@ namespace {
 
 int64_t MemoryMib(const WorkerSettings& settings) {
   return settings.memory_mib > 0 ? settings.memory_mib : std::max<int64_t>(1024, int64_t{512} * settings.cores);
+}
+
+absl::StatusOr<CoordinatorCredentials> ReadCredentials(const WorkerSettings& settings) {
+  CoordinatorCredentials credentials;
+  if (!settings.token_file.empty()) {
+    MW_ASSIGN_OR_RETURN(const std::string text, ReadFile(settings.token_file));
+    credentials.key = std::string(absl::StripAsciiWhitespace(text));
+  }
+  if (!settings.ca_file.empty()) {
+    MW_ASSIGN_OR_RETURN(credentials.ca_certificates, ReadFile(settings.ca_file));
+  }
+  return credentials;
 }
 
 class RealWorkerProgram final : public WorkerProgram {
@@ -91,7 +104,7 @@ absl::Status WorkerProgram::Check(const WorkerSettings& settings) {
   if (!settings.metrics_listen.empty()) {
     MW_RETURN_IF_ERROR(ParseHostPort(settings.metrics_listen, "--metrics-listen").status());
   }
-  MW_RETURN_IF_ERROR(ReadTokenFile(settings.grpc_token_file, "--grpc-token-file").status());
+  MW_RETURN_IF_ERROR(ReadCredentials(settings).status());
   const bool is_folder = !absl::StrContains(settings.blobs, "://");
   if (is_folder || ParseS3Url(settings.blobs).ok()) return absl::OkStatus();
   return absl::InvalidArgumentError(
@@ -104,9 +117,9 @@ absl::StatusOr<std::unique_ptr<WorkerProgram>> WorkerProgram::Make(const WorkerS
   if (!settings.blobs.empty()) {
     MW_ASSIGN_OR_RETURN(shared_blobs, OpenBlobStore(settings.blobs));
   }
-  MW_ASSIGN_OR_RETURN(const std::string token, ReadTokenFile(settings.grpc_token_file, "--grpc-token-file"));
-  auto program = std::make_unique<RealWorkerProgram>(settings, GrpcCoordinator::Connect(settings.coordinator, token),
-                                                     std::move(shared_blobs));
+  MW_ASSIGN_OR_RETURN(const CoordinatorCredentials credentials, ReadCredentials(settings));
+  auto program = std::make_unique<RealWorkerProgram>(
+      settings, GrpcCoordinator::Connect(settings.coordinator, credentials), std::move(shared_blobs));
   if (!settings.metrics_listen.empty()) MW_RETURN_IF_ERROR(program->ServeMetrics(settings.metrics_listen));
   return program;
 }

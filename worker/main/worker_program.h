@@ -9,9 +9,10 @@ namespace meshwright {
 
 struct WorkerSettings {
   std::string coordinator = "127.0.0.1:7420";  // host:port
-  std::string grpc_token_file;                 // the coordinator's; "": none
   std::string id;                              // "": host name and process
   std::string blobs;                           // the coordinator's, as for OpenBlobStore; "": through the coordinator
+  std::string token_file;                      // with the key to join with; "": none is shown
+  std::string ca_file;                         // PEM, of those who may vouch for the coordinator; "": no TLS
   int cores = 1;
   int64_t memory_mib = 0;  // 0: 512 for each core, at least 1024
   double drain_seconds = 30;

@@ -24,11 +24,24 @@ export class ApiError extends Error {
 // Set when the coordinator wants a token; the page asks for it.
 export const tokenWanted = signal(false);
 
-// A cookie, as pictures and downloads cannot carry a header.
-export function rememberToken(token: string) {
-  const secure = location.protocol === 'https:' ? '; Secure' : '';
-  document.cookie = `meshwright-token=${encodeURIComponent(token)}; SameSite=Strict; Path=/${secure}`;
-  tokenWanted.value = false;
+// With every request that changes something: other sites' pages cannot send it.
+export const csrfHeader = { 'X-Meshwright-Csrf': '1' };
+
+// Exchanges a key for a cookie that no script can read, as pictures and downloads cannot carry a header. False: the key
+// is none.
+export async function beginSession(key: string): Promise<boolean> {
+  const headers = { ...csrfHeader, Authorization: `Bearer ${key.trim()}` };
+  const response = await fetch(apiUrl('session'), { method: 'POST', headers }).catch(() => null);
+  if (response?.ok) tokenWanted.value = false;
+  return response?.ok ?? false;
+}
+
+// A share link carries its key behind "#key=", which browsers send nowhere.
+export async function openSharedLink(): Promise<void> {
+  const key = /^#key=([\w-]+)$/.exec(location.hash)?.[1];
+  if (!key) return;
+  history.replaceState(null, '', location.pathname + location.search);
+  await beginSession(key);
 }
 
 export async function errorOf(response: Response): Promise<ApiError> {
@@ -45,7 +58,7 @@ export async function errorOf(response: Response): Promise<ApiError> {
 async function call(path: string, init?: RequestInit): Promise<Response> {
   let response: Response;
   try {
-    response = await fetch(apiUrl(path), init);
+    response = await fetch(apiUrl(path), { ...init, headers: { ...csrfHeader, ...init?.headers } });
   } catch {
     throw new ApiError(0, 'The coordinator does not answer');
   }

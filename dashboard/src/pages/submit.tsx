@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { api, ApiError, errorOf, reconstructionUrl } from '../api/client';
+import { api, ApiError, csrfHeader, errorOf, reconstructionUrl } from '../api/client';
 import type { Option } from '../api/types';
 import { Notice, PageTitle } from '../components/pieces';
 import { bytes, count, duration } from '../format';
@@ -18,7 +18,7 @@ function sendPartTo(id: string): SendPart {
     try {
       response = await fetch(reconstructionUrl(id, `/files/${encoded}?${query}`), {
         method: 'PUT',
-        headers: { 'Content-Type': 'application/octet-stream' },
+        headers: { ...csrfHeader, 'Content-Type': 'application/octet-stream' },
         body,
       });
     } catch {

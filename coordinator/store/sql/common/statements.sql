@@ -10,20 +10,31 @@ INSERT INTO reconstruction_ids (id) VALUES (:id);
 
 -- name: create_reconstruction
 INSERT INTO reconstructions (id, options_json, scene_digest, state, created_at, state_reason, weight_thousandths,
-                             scene_reference)
-VALUES (:id, :options_json, :scene_digest, :state, :now, :reason, :weight_thousandths, :scene_reference);
+                             scene_reference, owner)
+VALUES (:id, :options_json, :scene_digest, :state, :now, :reason, :weight_thousandths, :scene_reference, :owner);
 
 -- name: get_reconstruction
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
-       cameras_in_flight, patches_filtered, patches_accepted
+       cameras_in_flight, patches_filtered, patches_accepted, owner
 FROM reconstructions WHERE id = :id;
 
 -- name: list_reconstructions
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
-       cameras_in_flight, patches_filtered, patches_accepted
+       cameras_in_flight, patches_filtered, patches_accepted, owner
 FROM reconstructions WHERE id > :after AND state <> 'deleting' ORDER BY id LIMIT :limit;
+
+-- name: list_reconstructions_of
+SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
+       finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
+       cameras_in_flight, patches_filtered, patches_accepted, owner
+FROM reconstructions WHERE owner = :owner AND id > :after AND state <> 'deleting' ORDER BY id LIMIT :limit;
+
+-- name: usage_of
+SELECT (SELECT count(*) FROM reconstructions WHERE owner = :owner AND state <> 'deleting'),
+       (SELECT coalesce(sum(f.size_bytes), 0) FROM scene_files AS f JOIN reconstructions AS r ON r.id = f.reconstruction_id
+        WHERE r.owner = :owner AND r.state <> 'deleting');
 
 -- name: set_reconstruction_scene
 UPDATE reconstructions SET scene_digest = :scene_digest, scene_blob = :scene_blob
@@ -295,3 +306,21 @@ SELECT min(progress.at)
 FROM (SELECT coalesce((SELECT c.committed_at FROM commits AS c WHERE c.reconstruction_id = r.id
                        ORDER BY c.sequence DESC LIMIT 1), r.created_at) AS at
       FROM reconstructions AS r WHERE r.state = 'running') AS progress;
+
+-- name: create_token
+INSERT INTO access_tokens (id, digest, user_name, role, reconstruction_id, created_at, expires_at)
+VALUES (:id, :digest, :user_name, :role, :reconstruction_id, :created_at, :expires_at);
+
+-- name: get_token
+SELECT id, digest, user_name, role, reconstruction_id, created_at, expires_at, revoked_at
+FROM access_tokens WHERE id = :id;
+
+-- name: list_tokens
+SELECT id, digest, user_name, role, reconstruction_id, created_at, expires_at, revoked_at
+FROM access_tokens ORDER BY created_at, id;
+
+-- name: revoke_token
+UPDATE access_tokens SET revoked_at = coalesce(revoked_at, CAST(:now AS BIGINT)) WHERE id = :id;
+
+-- name: remove_dead_tokens
+DELETE FROM access_tokens WHERE coalesce(revoked_at, expires_at) < CAST(:before AS BIGINT);
