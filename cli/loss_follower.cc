@@ -6,6 +6,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "common/json/json_text.h"
 #include "tools/loss_accounting/loss_accounting.h"
 
 #include "common/base/bad_input.h"
@@ -37,7 +38,7 @@ class AccountingFollower : public LossFollower {
     const LossReport lost = losses_.Account(mesh, pool_);
     report["losses"] = ToJson(lost);
     std::fputs(ToText(lost).c_str(), stderr);
-    return WriteFileAtomically(settings.report_path, report.dump(2) + "\n");
+    return WriteFileAtomically(settings.report_path, JsonText(report, 2) + "\n");
   }
 
  private:

@@ -8,6 +8,7 @@
 #include "pipeline/options/option_table.h"
 
 #include "cli/commands.h"
+#include "common/json/json_text.h"
 
 namespace meshwright {
 namespace {
@@ -29,7 +30,7 @@ std::string AsJson() {
                        {"help", option.help},
                        {"trade_off", option.trade_off}});
   }
-  return options.dump(2) + "\n";
+  return JsonText(options, 2) + "\n";
 }
 
 std::string AsMarkdown() {

@@ -11,6 +11,7 @@
 #include <absl/strings/str_format.h>
 
 #include "pipeline/options/option_table.h"
+#include "common/json/json_text.h"
 #include "pipeline/options/options_json.h"
 
 #include "cli/camera_stage.h"
@@ -18,7 +19,9 @@
 #include "cli/mesh_output.h"
 #include "cli/reconstruction_flags.h"
 #include "cli/service_arguments.h"
+#include "common/base/bad_input.h"
 #include "common/base/status_macros.h"
+#include "common/base/utf8.h"
 #include "common/mesh/formats/mesh_format.h"
 
 namespace meshwright {
@@ -75,11 +78,15 @@ absl::StatusOr<std::vector<std::string>> FilesOf(const std::string& folder) {
   }
   if (error) return absl::PermissionDeniedError(absl::StrCat(folder, ": cannot be read: ", error.message()));
   std::sort(files.begin(), files.end());
+  for (const std::string& file : files) {
+    if (IsUtf8(file)) continue;
+    return BadInput(absl::InvalidArgumentError(absl::StrCat(
+        folder, ": the name of ", ToUtf8(file), " is not UTF-8, which uploads need; rename it, also where the scene names it")));
+  }
   return files;
 }
 
-absl::Status Upload(const Arguments& arguments, ServiceClient& client) {
-  MW_ASSIGN_OR_RETURN(const std::vector<std::string> files, FilesOf(arguments.scene.path));
+absl::Status Upload(const Arguments& arguments, const std::vector<std::string>& files, ServiceClient& client) {
   int sent = 0;
   for (const std::string& file : files) {
     MW_RETURN_IF_ERROR(client.Upload(arguments.id, file, (fs::path(arguments.scene.path) / file).string()));
@@ -118,20 +125,26 @@ int Submit(Arguments& arguments) {
   if (!by_reference && LacksCameras(arguments.scene)) {
     if (const int code = EstimateCamerasFirst(arguments); code != kExitDone) return code;
   }
+  std::vector<std::string> files;
   if (!by_reference) {
     // Better known here and now than after it was uploaded.
     if (const auto scene = LoadScene(arguments.scene); !scene.ok()) return Fail(scene.status());
+    const absl::StatusOr<std::vector<std::string>> listed = FilesOf(arguments.scene.path);
+    if (!listed.ok()) return Fail(listed.status());
+    files = *listed;
+  } else if (!IsUtf8(arguments.scene.path)) {
+    return FailWrongUse(absl::StrCat(ToUtf8(arguments.scene.path), ": a name in UTF-8 expected"));
   }
   const auto client = arguments.service.Connect();
   v1::CreateReconstructionRequest request;
   request.set_id(arguments.id);
-  request.set_options_json(ToJson(arguments.options).dump());
+  request.set_options_json(JsonText(ToJson(arguments.options)));
   request.set_weight(arguments.weight);
   if (by_reference) request.set_scene_reference(arguments.scene.path);
   const absl::StatusOr<v1::Reconstruction> created = client->Create(request);
   if (!created.ok()) return FailCall(created.status(), arguments.service);
   if (!by_reference && created->state() == v1::RECONSTRUCTION_STATE_CREATED) {
-    if (const absl::Status status = Upload(arguments, *client); !status.ok())
+    if (const absl::Status status = Upload(arguments, files, *client); !status.ok())
       return FailCall(status, arguments.service);
   }
   const absl::StatusOr<v1::Reconstruction> started = client->Start(arguments.id);

@@ -6,6 +6,7 @@
 #include <absl/strings/str_format.h>
 
 #include "common/base/bad_input.h"
+#include "common/json/json_text.h"
 
 namespace meshwright {
 namespace {
@@ -32,8 +33,7 @@ int FailWrongUse(const std::string& message) {
 }
 
 void PrintJson(const nlohmann::ordered_json& json) {
-  // Names of files need not be UTF-8; JSON must be.
-  std::printf("%s\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
+  std::printf("%s\n", JsonText(json, 2).c_str());
 }
 
 std::string FormatDuration(double seconds) {

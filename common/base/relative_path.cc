@@ -5,6 +5,8 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
+#include "common/base/utf8.h"
+
 namespace meshwright {
 namespace {
 
@@ -21,9 +23,10 @@ absl::Status ValidateRelativePath(const std::string& path) {
   for (const std::string& part : std::vector<std::string>(absl::StrSplit(path, '/'))) {
     valid = valid && !part.empty() && part != "." && part != "..";
   }
-  if (valid) return absl::OkStatus();
+  if (valid && IsUtf8(path)) return absl::OkStatus();
+  if (valid) return absl::InvalidArgumentError(absl::StrCat("path \"", ToUtf8(path), "\": a name in UTF-8 expected"));
   return absl::InvalidArgumentError(
-      absl::StrCat("path \"", path.substr(0, 100), "\": a relative path inside the scene's folder expected"));
+      absl::StrCat("path \"", ToUtf8(path.substr(0, 100)), "\": a relative path inside the scene's folder expected"));
 }
 
 }  // namespace meshwright

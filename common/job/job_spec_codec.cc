@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json_text.h"
 #include "common/json/parse_json.h"
 
 namespace meshwright {
@@ -21,7 +22,7 @@ std::string EncodeJobSpec(const StoredJobSpec& spec) {
   for (const AcceptedSurface& surface : spec.accepted) {
     json["accepted"].push_back({surface.sequence, surface.camera, surface.digest, surface.patches});
   }
-  return json.dump();
+  return JsonText(json);
 }
 
 absl::StatusOr<StoredJobSpec> DecodeJobSpec(const std::string& text) {

@@ -15,7 +15,7 @@ namespace meshwright {
 
 // One photograph with its camera as the file describes it: the lens may distort, the picture is not decoded.
 struct SceneView {
-  std::string name;        // as the scene's file calls the image; unique
+  std::string name;        // as the scene's file calls the image, made UTF-8 (ToUtf8); unique
   std::string image_path;  // where the picture is
   Lens lens;               // intrinsics and distortion at the size of the picture
   Rigid3 cam_from_world;

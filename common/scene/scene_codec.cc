@@ -7,6 +7,7 @@
 
 #include "common/base/digest.h"
 #include "common/base/little_endian.h"
+#include "common/base/utf8.h"
 
 namespace meshwright {
 namespace {
@@ -83,7 +84,7 @@ class Reader {
 };
 
 bool ReadView(Reader& reader, SceneView& view) {
-  view.name = reader.NextText();
+  view.name = ToUtf8(reader.NextText());
   view.image_path = reader.NextText();
   Lens& lens = view.lens;
   const auto model = reader.Next<int32_t>();

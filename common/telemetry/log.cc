@@ -10,6 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "common/json/json_text.h"
+
 namespace meshwright {
 namespace {
 
@@ -25,11 +27,6 @@ const char* NameOf(LogLevel level) {
   return "";
 }
 
-// Reasons come from outside: bytes that are no text must not make a line unreadable for other programs.
-std::string Dump(const nlohmann::ordered_json& json) {
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
-
 nlohmann::ordered_json ToJson(const LogValue& value) {
   return std::visit([](const auto& held) { return nlohmann::ordered_json(held); }, value);
 }
@@ -37,7 +34,7 @@ nlohmann::ordered_json ToJson(const LogValue& value) {
 std::string ToText(const LogValue& value) {
   const auto* const text = std::get_if<std::string>(&value);
   const bool plain = text == nullptr || (!text->empty() && text->find_first_of(" \t\r\n\"=\\") == std::string::npos);
-  return text != nullptr && plain ? *text : Dump(ToJson(value));
+  return text != nullptr && plain ? *text : JsonText(ToJson(value));
 }
 
 }  // namespace
@@ -85,7 +82,7 @@ void Logger::Log(LogLevel level, const std::string& message, const LogFields& fi
     for (const LogFields* const some : {&always_, &fields}) {
       for (const auto& [name, value] : *some) line[name] = ToJson(value);
     }
-    sink_(Dump(line));
+    sink_(JsonText(line));
     return;
   }
   std::string line = absl::StrFormat("%s %-7s %s", time, NameOf(level), message);

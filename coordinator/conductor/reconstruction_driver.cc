@@ -11,6 +11,7 @@
 #include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
+#include "common/base/utf8.h"
 #include "common/blob/lost_blob.h"
 #include "common/scene/scene_codec.h"
 #include "common/scene/view.h"
@@ -105,7 +106,7 @@ bool ReconstructionDriver::WaitForNews() {
 
 absl::Status ReconstructionDriver::SetState(ReconstructionState state, const std::string& reason) {
   const absl::Status status =
-      environment_.store->SetReconstructionState(id_, state, environment_.clock->Now(), reason, epoch_);
+      environment_.store->SetReconstructionState(id_, state, environment_.clock->Now(), ToUtf8(reason), epoch_);
   changed_(false);
   // Cancelled or deleted meanwhile.
   return absl::IsFailedPrecondition(status) || absl::IsNotFound(status) ? Stopped() : status;

@@ -11,6 +11,7 @@
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json_text.h"
 #include "coordinator/api/public_text.h"
 
 namespace meshwright {
@@ -145,7 +146,7 @@ std::string ProblemJson(const absl::Status& status) {
   problem["code"] = absl::StatusCodeToString(status.code());
   if (const std::optional<std::string> field = FieldOf(status)) problem["field"] = *field;
   // Messages quote what came from outside, which need not be text.
-  return problem.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return JsonText(problem);
 }
 
 absl::Status StatusOfFault(const HttpFault& fault) {

@@ -19,6 +19,8 @@
 #include <absl/time/time.h>
 #include <nlohmann/json.hpp>
 
+#include "common/base/utf8.h"
+#include "common/json/json_text.h"
 #include "pipeline/cameras/camera_groups.h"
 #include "pipeline/cameras/child_process.h"
 #include "pipeline/cameras/colmap_database.h"
@@ -191,7 +193,7 @@ class Estimation {
       if (error) return SystemError(path, "cannot be removed", error);
     }
     state_ = {{"inputs", Inputs()}, {"done", Json::array()}};
-    return WriteFileAtomically(StatePath().string(), state_.dump(2) + "\n");
+    return WriteFileAtomically(StatePath().string(), JsonText(state_, 2) + "\n");
   }
 
   bool IsDone(const char* step) const {
@@ -201,7 +203,7 @@ class Estimation {
 
   absl::Status MarkDone(const char* step) {
     state_["done"].push_back(step);
-    return WriteFileAtomically(StatePath().string(), state_.dump(2) + "\n");
+    return WriteFileAtomically(StatePath().string(), JsonText(state_, 2) + "\n");
   }
 
   // Names without spaces, in natural order, under which COLMAP sees photographs and masks: its lists of pairs are split
@@ -420,7 +422,7 @@ class Estimation {
     for (const SceneView& view : scene.views) registered.insert(view.name);
     std::vector<std::string> missing;
     for (const Photograph& photograph : photographs_.photographs) {
-      if (registered.count(photograph.name) == 0) missing.push_back(photograph.name);
+      if (registered.count(ToUtf8(photograph.name)) == 0) missing.push_back(ToUtf8(photograph.name));
     }
     estimate.registered_names.assign(registered.begin(), registered.end());
     std::error_code error;

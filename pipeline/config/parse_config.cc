@@ -1,5 +1,6 @@
 #include "pipeline/config/parse_config.h"
 
+#include "common/json/json_text.h"
 #include "pipeline/options/options_json.h"
 
 #include "common/base/status_macros.h"
@@ -9,7 +10,7 @@ namespace meshwright {
 
 absl::StatusOr<ReconstructionConfig> ParseConfig(const std::string& options_json) {
   MW_ASSIGN_OR_RETURN(const ReconstructionOptions options, ParseOptions(options_json));
-  ReconstructionConfig config = {.options_json = ToJson(options).dump(),
+  ReconstructionConfig config = {.options_json = JsonText(ToJson(options)),
                                  .max_image_size = options.max_image_size,
                                  .conductor = options.conductor,
                                  .join = options.join};

@@ -11,6 +11,7 @@
 #include <absl/strings/str_format.h>
 #include <absl/time/clock.h>
 
+#include "common/json/json_text.h"
 #include "pipeline/local/report.h"
 #include "pipeline/local/work_folder.h"
 #include "pipeline/options/options_json.h"
@@ -166,7 +167,7 @@ class LocalReconstruction {
                           Tell(LocalStage::kChecking, checked, photographs);
                         }));
     MW_ASSIGN_OR_RETURN(
-        work_, WorkFolder::Open(settings_.work_folder, digest, ToJson(options_).dump(), settings_.restart, clock_));
+        work_, WorkFolder::Open(settings_.work_folder, digest, JsonText(ToJson(options_)), settings_.restart, clock_));
     return absl::OkStatus();
   }
 
@@ -254,7 +255,7 @@ class LocalReconstruction {
     }
     Json report = MakeReport(counts, std::move(cameras));
     if (!texture.is_null()) report["texture"] = std::move(texture);
-    MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, report.dump(2) + "\n"));
+    MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, JsonText(report, 2) + "\n"));
     return report;
   }
 

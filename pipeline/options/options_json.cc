@@ -5,6 +5,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "common/json/json_text.h"
 #include "pipeline/options/option_table.h"
 
 #include "common/base/status_macros.h"
@@ -31,7 +32,7 @@ OptionValue NumberOf(const nlohmann::json& number) {
 absl::Status SetOption(const std::string& name, const nlohmann::json& json, ReconstructionOptions& options) {
   const Option* const option = FindOption(name);
   if (option == nullptr) return absl::InvalidArgumentError(DescribeUnknownOption(name, ""));
-  const std::string text = json.dump();
+  const std::string text = JsonText(json);
   // What is no number is as wrong as one out of range, and answered alike.
   const OptionValue number = json.is_number() ? NumberOf(json) : std::numeric_limits<double>::quiet_NaN();
   MW_ASSIGN_OR_RETURN(const OptionValue value, CheckOptionValue(*option, number, text, ""));
@@ -60,7 +61,7 @@ absl::StatusOr<ReconstructionOptions> ParseOptions(const std::string& options_js
   }
   const auto version = json->find(kVersion);
   if (version != json->end() && *version != MW_VERSION) {
-    return Wrong(absl::StrCat("version is ", version->dump().substr(0, 40), ", this is ", MW_VERSION));
+    return Wrong(absl::StrCat("version is ", JsonText(*version).substr(0, 40), ", this is ", MW_VERSION));
   }
   if (const absl::Status checked = CheckOptions(options, ""); !checked.ok()) {
     return Wrong(std::string(checked.message()));
@@ -80,8 +81,8 @@ std::vector<std::string> DescribeDifferences(const nlohmann::ordered_json& befor
   for (const auto& [name, value] : now.items()) {
     const auto stored = before.find(name);
     if (stored != before.end() && *stored == value) continue;
-    differences.push_back(absl::StrCat("--", name, " was ", stored == before.end() ? "not known" : stored->dump(),
-                                       ", now ", value.dump()));
+    differences.push_back(absl::StrCat("--", name, " was ", stored == before.end() ? "not known" : JsonText(*stored),
+                                       ", now ", JsonText(value)));
   }
   return differences;
 }
@@ -101,7 +102,7 @@ std::string DescribeOptionsForRest() {
   }
   nlohmann::ordered_json response;
   response["options"] = std::move(list);
-  return response.dump();
+  return JsonText(response);
 }
 
 }  // namespace meshwright

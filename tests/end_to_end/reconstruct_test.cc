@@ -117,6 +117,34 @@ TEST(ReconstructTest, SameBytesWhateverTheOrderOfImagesInTheFile) {
   EXPECT_TRUE(Reconstruct(scene, folder / "mesh.ply") == ReferenceMesh());
 }
 
+// `scene` with its last photograph called 0007 and a byte that is no text.
+std::string WithANameThatIsNoText(const std::string& scene, const std::string& copy) {
+  fs::copy(scene, copy, fs::copy_options::recursive);
+  const std::string name = "0007\xE9.png";
+  fs::rename(copy + "/images/0007.png", copy + "/images/" + name);
+  std::string images = ReadBytes(copy + "/model/images.txt");
+  images.replace(images.find("0007.png"), 8, name);
+  WriteBytes(copy + "/model/images.txt", images);
+  return copy;
+}
+
+TEST(ReconstructTest, NamesThatAreNoTextChangeNothing) {
+  const TemporaryFolder folder;
+  const std::string scene = WithANameThatIsNoText(SharedScene("small"), folder / "sc\xE8ne");
+  const std::vector<std::string> quick = {"--max-image-size", "160"};
+  EXPECT_TRUE(Reconstruct(scene, folder / "m\xE9sh.ply", quick) ==
+              Reconstruct(SharedScene("small"), folder / "mesh.ply", quick));
+  const nlohmann::json report = nlohmann::json::parse(ReadBytes(folder / "m\xE9sh.report.json"), nullptr, false);
+  ASSERT_TRUE(report.is_object());
+  std::vector<std::string> names;
+  for (const auto& camera : report["cameras"]) names.push_back(camera["name"]);
+  EXPECT_THAT(names, testing::Contains("0007%E9.png"));
+  // Uploads have no way to say such a name.
+  const RunResult submitted = RunMeshwright({"submit", scene, "--coordinator", "127.0.0.1:1"});
+  EXPECT_EQ(submitted.exit_code, 3);
+  EXPECT_THAT(submitted.err, testing::HasSubstr("images/0007%E9.png"));
+}
+
 TEST(ReconstructTest, TheReportSaysWhatWasDone) {
   const TemporaryFolder folder;
   const RunResult result = RunMeshwright(

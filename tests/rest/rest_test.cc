@@ -216,6 +216,34 @@ TEST_F(RestTest, TheMeshSoFarWhileItRuns) {
   EXPECT_EQ(Sha256Hex(http_->Get(base + "/mesh?partial=true")->body), GetJson(base)["meshSha256"]);
 }
 
+// Names of files are bytes, JSON and Protocol Buffers are not.
+TEST_F(RestTest, NamesThatAreNoTextEndNothing) {
+  const std::string scene = folder_ + "/scenes/a";
+  for (const auto& [path, content] : SceneFiles()) {
+    std::string name = path;
+    std::string bytes = content;
+    if (path == "images/0004.png") name = "images/0004\xE9.png";
+    if (path == "model/images.txt") bytes.replace(bytes.find("0004.png"), 8, "0004\xE9.png");
+    std::filesystem::create_directories(std::filesystem::path(scene + "/" + name).parent_path());
+    ASSERT_TRUE(WriteFileAtomically(scene + "/" + name, bytes).ok());
+  }
+  const std::string base = "/v1/reconstructions/bytes";
+  ASSERT_EQ(PostJson("/v1/reconstructions", R"({"id":"bytes","sceneReference":"file:a"})")->status, 200);
+  ASSERT_EQ(http_->Post(base + ":start")->status, 200);
+  StartWorker();
+  while (GetJson(base)["state"] != "RECONSTRUCTION_STATE_DONE") {
+    ASSERT_NE(GetJson(base)["state"], "RECONSTRUCTION_STATE_FAILED");
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  EXPECT_EQ(GetJson(base + "/cameras")["cameras"][4]["name"], "0004%E9.png");
+  EXPECT_EQ(ReadEvents("bytes").back().data["state"], "RECONSTRUCTION_STATE_DONE");
+
+  Create("put");
+  const auto put = PutPart("put", "images/a%E9.png", "bytes", 0, 5);
+  EXPECT_EQ(put->status, 400);
+  EXPECT_THAT(put->body, HasSubstr("UTF-8"));
+}
+
 TEST_F(RestTest, ADrainedWorkerGetsNothing) {
   EXPECT_EQ(http_->Post("/v1/workers/w:drain")->status, 404);
   StartWorker();

@@ -12,6 +12,7 @@
 #include <absl/time/clock.h>
 
 #include "common/base/status_macros.h"
+#include "common/base/utf8.h"
 #include "worker/job_input/run_job.h"
 
 namespace meshwright {
@@ -199,7 +200,7 @@ v1::HeldJob Agent::Process(const v1::CameraJob& job) {
       result.mutable_weak_targets()->Add(finished->weak_targets.begin(), finished->weak_targets.end());
       result.set_report_json(finished->report_json);
     } else {
-      told.mutable_failed()->set_reason(std::string(finished.status().message()));
+      told.mutable_failed()->set_reason(ToUtf8(std::string(finished.status().message())));
       told.mutable_failed()->set_infrastructure(!IsJobsFault(finished.status()));
       told.mutable_failed()->set_damaged_blob(LostBlobOf(finished.status()));
     }

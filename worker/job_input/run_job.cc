@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/status_macros.h"
+#include "common/json/json_text.h"
 #include "common/surface/codec.h"
 
 namespace meshwright {
@@ -59,7 +60,7 @@ absl::StatusOr<FinishedJob> RunJob(const Scene& scene, const CameraJobSpec& spec
   result.report.seconds_visibility = prepared.seconds_visibility;
   finished.report = result.report;
   finished.weak_targets = std::move(result.weak_targets);
-  finished.report_json = MakeJobReport(scene, spec, finished.report, prepared.seconds_loading).dump();
+  finished.report_json = JsonText(MakeJobReport(scene, spec, finished.report, prepared.seconds_loading));
   prepared = {};  // photographs are gone before the surface is encoded
   MW_ASSIGN_OR_RETURN(finished.filtered_digest, blobs.Put(EncodeSurface(result.filtered)));
   return finished;

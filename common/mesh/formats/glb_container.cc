@@ -6,6 +6,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "common/base/little_endian.h"
+#include "common/json/json_text.h"
 
 namespace meshwright::glb {
 namespace {
@@ -44,7 +45,7 @@ size_t AddAccessor(uint64_t count, uint64_t row_bytes, int component, const char
 }
 
 absl::StatusOr<std::string> Head(const Description& description, size_t json_bytes, const std::string& path) {
-  std::string text = description.gltf.dump();
+  std::string text = JsonText(description.gltf);
   while (text.size() < json_bytes || text.size() % 4 != 0) text.push_back(' ');
   constexpr uint64_t kFileHeaderBytes = 12;
   constexpr uint64_t kChunkHeaderBytes = 8;

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/status_macros.h"
+#include "common/json/json_text.h"
 #include "common/mesh/formats/glb.h"
 #include "common/mesh/formats/las.h"
 #include "common/mesh/formats/obj.h"
@@ -93,7 +94,7 @@ std::string DescribeMeshFormats() {
   }
   nlohmann::ordered_json answer;
   answer["formats"] = std::move(list);
-  return answer.dump();
+  return JsonText(answer);
 }
 
 absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, bool points, const std::string& path) {

@@ -8,6 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/image/encode.h"
+#include "common/json/json_text.h"
 #include "common/mesh/formats/glb_container.h"
 #include "common/mesh/formats/obj_text.h"
 #include "common/mesh/formats/row_writer.h"
@@ -30,7 +31,7 @@ class GlbWriter final : public TexturedMeshWriter {
   absl::Status Begin() {
     constexpr uint64_t kLongest = 999'999'999;  // bytes of a picture, as long as a number can be
     const glb::Description longest = Describe(std::vector<uint64_t>(parts_.size(), kLongest));
-    json_bytes_ = longest.gltf.dump().size();
+    json_bytes_ = JsonText(longest.gltf).size();
     MW_ASSIGN_OR_RETURN(const std::string head, Head(std::vector<uint64_t>(parts_.size(), 0)));
     MW_RETURN_IF_ERROR(file_.Append(head));
     for (const TexturePart& part : parts_) {

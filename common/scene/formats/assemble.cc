@@ -15,6 +15,7 @@
 #include <absl/strings/str_join.h>
 
 #include "common/base/status_macros.h"
+#include "common/base/utf8.h"
 #include "common/image/decode.h"
 #include "common/scene/undistorted_pinhole.h"
 
@@ -259,8 +260,10 @@ absl::StatusOr<Scene> AssembleScene(ImportedScene imported, const ImportOptions&
     }
     imported.image_folders = {options.images_folder};
   }
-  MW_ASSIGN_OR_RETURN(const std::vector<size_t> order, OrderOfNames(views));
+  MW_ASSIGN_OR_RETURN(std::vector<size_t> order, OrderOfNames(views));
   MW_RETURN_IF_ERROR(FindPictures(order, &imported));
+  for (ImportedView& view : views) view.view.name = ToUtf8(view.view.name);  // files are found by their bytes
+  MW_ASSIGN_OR_RETURN(order, OrderOfNames(views));
 
   Scene scene{.format = std::move(imported.format), .views = {}, .points = std::move(imported.points)};
   scene.warnings = std::move(imported.warnings);

@@ -464,6 +464,19 @@ TEST(ImportScene, PicturesAreFoundWhateverTheCaseOrFolderOfTheirNames) {
   EXPECT_THAT(InvalidMessage(files), HasSubstr("expected one picture, not both"));
 }
 
+TEST(ImportScene, NamesAreMadeUtf8AndFilesFoundByTheirBytes) {
+  SceneFiles files = SmallColmapText();
+  files["images.txt"] = ReplaceOnce(files["images.txt"], "c.png", "caf\xE9.png");
+  files["images/caf\xE9.png"] = SmallPicture();
+  const Scene scene = ImportFresh("bytes", files);
+  EXPECT_EQ(scene.views[2].name, "caf%E9.png");
+  EXPECT_THAT(scene.views[2].image_path, EndsWith("images/caf\xE9.png"));
+  // Two names must not become one.
+  files["images.txt"] = ReplaceOnce(files["images.txt"], "b.png", "caf%E9.png");
+  files["images/caf%E9.png"] = SmallPicture();
+  EXPECT_THAT(InvalidMessage(files), HasSubstr("expected a name not used before"));
+}
+
 TEST(ImportScene, PathsOfOtherMachines) {
   EXPECT_EQ(PortableImageName("C:\\photos\\a.png"), "a.png");
   EXPECT_EQ(PortableImageName("/home/x/a.png"), "a.png");
