@@ -34,10 +34,12 @@ absl::StatusOr<EvaluationReport> RunEvaluation(const Arguments& arguments) {
   MW_ASSIGN_OR_RETURN(const Scene scene, LoadScene(arguments.scene));
   std::vector<Camera> cameras;
   for (const SceneView& view : scene.views) cameras.push_back(UndistortedCamera(view, arguments.max_image_size));
-  const absl::StatusOr<TriangleMesh> reconstruction = ReadPly(arguments.reconstruction);
+  absl::StatusOr<TriangleMesh> reconstruction = ReadPly(arguments.reconstruction);
   if (!reconstruction.ok()) return BadInput(reconstruction.status());
-  const absl::StatusOr<TriangleMesh> ground_truth = ReadPly(arguments.ground_truth);
+  absl::StatusOr<TriangleMesh> ground_truth = ReadPly(arguments.ground_truth);
   if (!ground_truth.ok()) return BadInput(ground_truth.status());
+  ChangeOffset(scene.offset, *reconstruction);
+  ChangeOffset(scene.offset, *ground_truth);
   absl::StatusOr<EvaluationReport> report = Evaluate(*reconstruction, *ground_truth, cameras, arguments.options, pool);
   if (!report.ok()) return BadInput(report.status());
   return report;

@@ -20,9 +20,9 @@ namespace {
 absl::Status FetchParts(ServiceClient& client, const std::string& id, const std::string& path) {
   MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts, client.ListParts(id));
   if (parts.parts().empty()) return absl::FailedPreconditionError(absl::StrCat(id, ": no surface is accepted yet"));
-  MW_ASSIGN_OR_RETURN(
-      PlyStreamWriter writer,
-      PlyStreamWriter::Create(path, {.normals = true, .colors = true, .quality = true, .cameras = true}));
+  PlyAttributes attributes = {.normals = true, .colors = true, .quality = true, .cameras = true};
+  if (parts.offset_size() == 3) attributes.offset = {parts.offset(0), parts.offset(1), parts.offset(2)};
+  MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, attributes));
   for (const v1::Part& part : parts.parts()) {
     MW_ASSIGN_OR_RETURN(const std::string bytes, client.DownloadPart(id, part));
     MW_ASSIGN_OR_RETURN(const PatchLattice surface, DecodeSurface(bytes));

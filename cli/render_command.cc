@@ -53,13 +53,16 @@ absl::StatusOr<Camera> FindCamera(const Scene& scene, const Arguments& arguments
 // What is drawn: a mesh or point cloud with colours at its vertices, or a model with a texture atlas.
 class Drawing {
  public:
-  static absl::StatusOr<std::unique_ptr<Drawing>> Read(const std::string& path) {
+  // In the frame of a scene with this offset.
+  static absl::StatusOr<std::unique_ptr<Drawing>> Read(const std::string& path, const Eigen::Vector3d& offset) {
     auto drawing = std::make_unique<Drawing>();
     if (absl::EndsWithIgnoreCase(path, ".glb")) {
       MW_ASSIGN_OR_RETURN(drawing->model_, ReadTexturedGlb(path));
+      ChangeOffset(offset, drawing->model_.mesh);
       drawing->textured_.emplace(drawing->model_);
     } else {
       MW_ASSIGN_OR_RETURN(drawing->model_.mesh, ReadPly(path));
+      ChangeOffset(offset, drawing->model_.mesh);
     }
     drawing->colored_.emplace(drawing->model_.mesh);
     return drawing;
@@ -110,7 +113,7 @@ absl::Status RenderMesh(const Arguments& arguments) {
   ThreadPool pool(arguments.threads);
   MW_ASSIGN_OR_RETURN(const Scene scene, LoadScene(arguments.scene));
   MW_ASSIGN_OR_RETURN(Camera camera, FindCamera(scene, arguments));
-  const absl::StatusOr<std::unique_ptr<Drawing>> drawing = Drawing::Read(arguments.mesh);
+  const absl::StatusOr<std::unique_ptr<Drawing>> drawing = Drawing::Read(arguments.mesh, scene.offset);
   if (!drawing.ok()) return BadInput(drawing.status());
   if (arguments.orbit_deg != 0 || arguments.pitch_deg != 0) {
     camera = OrbitCamera(camera, (*drawing)->colored().Pivot(camera, pool), arguments.orbit_deg * kRadiansPerDegree,

@@ -11,7 +11,6 @@
 #include <absl/strings/str_format.h>
 
 #include "pipeline/options/option_table.h"
-#include "common/json/json_text.h"
 #include "pipeline/options/options_json.h"
 
 #include "cli/camera_stage.h"
@@ -22,6 +21,7 @@
 #include "common/base/bad_input.h"
 #include "common/base/status_macros.h"
 #include "common/base/utf8.h"
+#include "common/json/json_text.h"
 #include "common/mesh/formats/mesh_format.h"
 
 namespace meshwright {
@@ -80,8 +80,9 @@ absl::StatusOr<std::vector<std::string>> FilesOf(const std::string& folder) {
   std::sort(files.begin(), files.end());
   for (const std::string& file : files) {
     if (IsUtf8(file)) continue;
-    return BadInput(absl::InvalidArgumentError(absl::StrCat(
-        folder, ": the name of ", ToUtf8(file), " is not UTF-8, which uploads need; rename it, also where the scene names it")));
+    return BadInput(absl::InvalidArgumentError(
+        absl::StrCat(folder, ": the name of ", ToUtf8(file),
+                     " is not UTF-8, which uploads need; rename it, also where the scene names it")));
   }
   return files;
 }

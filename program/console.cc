@@ -32,9 +32,7 @@ int FailWrongUse(const std::string& message) {
   return kExitWrongUse;
 }
 
-void PrintJson(const nlohmann::ordered_json& json) {
-  std::printf("%s\n", JsonText(json, 2).c_str());
-}
+void PrintJson(const nlohmann::ordered_json& json) { std::printf("%s\n", JsonText(json, 2).c_str()); }
 
 std::string FormatDuration(double seconds) {
   const auto total = static_cast<int64_t>(std::llround(seconds));

@@ -53,3 +53,4 @@ std::string ToUtf8(std::string_view text) {
 }
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

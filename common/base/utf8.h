@@ -13,3 +13,4 @@ bool IsUtf8(std::string_view text);
 std::string ToUtf8(std::string_view text);
 
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

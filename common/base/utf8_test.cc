@@ -17,9 +17,9 @@ TEST(Utf8, OtherBytesAreWrittenInHexadecimal) {
   EXPECT_EQ(ToUtf8("caf\xE9.png"), "caf%E9.png");
   EXPECT_EQ(ToUtf8("\xE9"), "%E9");
   EXPECT_EQ(ToUtf8("\xC3\xA9\xC3"), "\u00e9%C3");
-  EXPECT_EQ(ToUtf8("\xC0\xAF"), "%C0%AF");              // overlong
-  EXPECT_EQ(ToUtf8("\xE0\x80\x80"), "%E0%80%80");       // overlong
-  EXPECT_EQ(ToUtf8("\xED\xA0\x80"), "%ED%A0%80");       // half of a surrogate pair
+  EXPECT_EQ(ToUtf8("\xC0\xAF"), "%C0%AF");                // overlong
+  EXPECT_EQ(ToUtf8("\xE0\x80\x80"), "%E0%80%80");         // overlong
+  EXPECT_EQ(ToUtf8("\xED\xA0\x80"), "%ED%A0%80");         // half of a surrogate pair
   EXPECT_EQ(ToUtf8("\xF4\x90\x80\x80"), "%F4%90%80%80");  // beyond the last character
 }
 
@@ -35,3 +35,4 @@ TEST(Utf8, WhateverTheBytesTheResultIsUtf8) {
 
 }  // namespace
 }  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0

@@ -13,7 +13,7 @@ struct LensCase {
   Lens lens;
 };
 
-Lens MakeLens(Lens::Model model, std::array<double, 8> coefficients, double focal = 1000) {
+Lens MakeLens(Lens::Model model, std::array<double, 12> coefficients, double focal = 1000) {
   return {.width = 1600,
           .height = 1200,
           .fx = focal,
@@ -66,6 +66,13 @@ INSTANTIATE_TEST_SUITE_P(
                     LensCase{"RadialFisheye", MakeLens(Lens::Model::kRadialFisheye, {-0.03, 0.004})},
                     LensCase{"Fov", MakeLens(Lens::Model::kFov, {0.9})},
                     LensCase{"FovWithoutDistortion", MakeLens(Lens::Model::kFov, {0})},
+                    LensCase{"Brown", MakeLens(Lens::Model::kBrown, {-0.2, 0.05, 1e-3, -2e-3, 0.01, -0.002})},
+                    LensCase{"RadTanThinPrismFisheye",
+                             MakeLens(Lens::Model::kRadTanThinPrismFisheye,
+                                      {-0.02, 0.01, -0.004, 0.001, 1e-4, 1e-5, 1e-3, -1e-3, 5e-4, -2e-4, 3e-4, 1e-4})},
+                    LensCase{"Division", MakeLens(Lens::Model::kDivision, {-0.2})},
+                    LensCase{"DivisionInwards", MakeLens(Lens::Model::kDivision, {0.1})},
+                    LensCase{"Eucm", MakeLens(Lens::Model::kEucm, {0.6, 1.1})},
                     LensCase{"ThinPrismFisheye", MakeLens(Lens::Model::kThinPrismFisheye,
                                                           {-0.03, 0.01, 1e-3, -1e-3, 0.002, -0.001, 5e-4, -5e-4})}),
     [](const testing::TestParamInfo<LensCase>& info) { return info.param.name; });

@@ -21,7 +21,9 @@
 namespace meshwright {
 namespace {
 
-constexpr PlyAttributes kAttributes = {.normals = true, .colors = true, .quality = true, .cameras = true};
+PlyAttributes AttributesWith(const Eigen::Vector3d& offset) {
+  return {.normals = true, .colors = true, .quality = true, .cameras = true, .offset = offset};
+}
 // Seams are one or two steps wide; the circle through their corners is a little larger.
 constexpr double kStitchReach = 2;
 // Offsets at a seam are averaged over this many vertices to either side, so that texture does not smear.
@@ -315,8 +317,8 @@ absl::Status JoinOptions::Validate() const {
 }
 
 absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurface& load, const JoinOptions& options,
-                                                 const std::string& path, ThreadPool& pool,
-                                                 const std::function<void()>& part_done) {
+                                                 const Eigen::Vector3d& offset, const std::string& path,
+                                                 ThreadPool& pool, const std::function<void()>& part_done) {
   MW_RETURN_IF_ERROR(options.Validate());
   JoinedMeshCounts counts;
   MW_ASSIGN_OR_RETURN(PartBorders borders, FindPartBorders(count, load, pool, part_done));
@@ -329,7 +331,7 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
   }
   const Joins joins = JoinBorders(borders, options, counts);
 
-  MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, kAttributes));
+  MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, AttributesWith(offset)));
   PartWriter part_writer(borders, joins, writer);
   for (const auto& [first, last] : BatchesOfParts(patches)) {
     std::vector<FinishedPart> parts(static_cast<size_t>(last - first));

@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 
+#include <Eigen/Core>
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
@@ -41,17 +42,18 @@ struct JoinedMeshCounts {
 };
 
 // Joins the accepted surfaces 0 .. count - 1 (M_r of section 3.7, Jancosek et al. 2009, which leaves them side by side)
-// into one mesh and writes it as PLY. Where surfaces overlap, the earlier one stays. Borders that come close are
-// stitched, holes filled, small pieces left out, colours run into each other at the seams; positions stay. Parts are
-// simplified one by one if wanted, all but their borders. Every edge has one or two triangles, and two run along it in
-// opposite directions. The bytes depend on the surfaces and their order alone, not on the threads.
+// into one mesh and writes it as PLY, with `offset` added (Scene::offset). Where surfaces overlap, the earlier one
+// stays. Borders that come close are stitched, holes filled, small pieces left out, colours run into each other at the
+// seams; positions stay. Parts are simplified one by one if wanted, all but their borders. Every edge has one or two
+// triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their order alone, not
+// on the threads.
 //
 // Loads each surface a few times, a few of them at a time, and keeps the vertices on borders of all of them (some 300
 // bytes each, and 1/4 byte for each patch). `part_done` is called twice per surface, one call at a time. Errors: those
 // of `load` or of PlyStreamWriter, InvalidArgument for options; then no file appears.
 absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(
-    int64_t count, const LoadSurface& load, const JoinOptions& options, const std::string& path, ThreadPool& pool,
-    const std::function<void()>& part_done = [] {});
+    int64_t count, const LoadSurface& load, const JoinOptions& options, const Eigen::Vector3d& offset,
+    const std::string& path, ThreadPool& pool, const std::function<void()>& part_done = [] {});
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

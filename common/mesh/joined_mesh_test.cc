@@ -202,7 +202,7 @@ class JoinedMeshTest : public testing::Test {
     ThreadPool pool(threads);
     const auto counts = WriteJoinedMesh(
         static_cast<int64_t>(surfaces.size()), [&](int64_t i) { return Sparse(surfaces[static_cast<size_t>(i)]); },
-        options, Path(), pool);
+        options, Eigen::Vector3d::Zero(), Path(), pool);
     EXPECT_TRUE(counts.ok()) << counts.status();
     if (!counts.ok()) return {};
     counts_ = *counts;
@@ -428,7 +428,8 @@ TEST_F(JoinedMeshTest, SurfaceThatCannotBeLoadedLeavesNoFile) {
     if (i == 2) return absl::DataLossError("surface 2 is damaged");
     return Sparse(PlaneSeenBy(0, left_, Everywhere));
   };
-  EXPECT_EQ(WriteJoinedMesh(3, load, {}, Path(), pool).status(), absl::DataLossError("surface 2 is damaged"));
+  EXPECT_EQ(WriteJoinedMesh(3, load, {}, Eigen::Vector3d::Zero(), Path(), pool).status(),
+            absl::DataLossError("surface 2 is damaged"));
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 

@@ -35,7 +35,8 @@ void BM_WriteJoinedMesh(benchmark::State& state) {
   int64_t faces = 0;
   for (auto _ : state) {
     const auto counts = WriteJoinedMesh(
-        4, [&](int64_t i) { return surfaces[static_cast<size_t>(i)]; }, options, BenchmarkPath(), pool);
+        4, [&](int64_t i) { return surfaces[static_cast<size_t>(i)]; }, options, Eigen::Vector3d::Zero(),
+        BenchmarkPath(), pool);
     MW_CHECK(counts.ok());
     faces += counts->faces + counts->faces_simplified;
   }
@@ -45,7 +46,9 @@ void BM_WriteJoinedMesh(benchmark::State& state) {
 BENCHMARK(BM_WriteJoinedMesh)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 void BM_ReadPly(benchmark::State& state) {
-  MW_CHECK(WriteSurfacePart(RandomSurface(1, SmallCamera(1536, 1024), 1, 0.97, 0.98), BenchmarkPath()).ok());
+  MW_CHECK(WriteSurfacePart(RandomSurface(1, SmallCamera(1536, 1024), 1, 0.97, 0.98), Eigen::Vector3d::Zero(),
+                            BenchmarkPath())
+               .ok());
   const auto bytes = static_cast<int64_t>(std::filesystem::file_size(BenchmarkPath()));
   for (auto _ : state) benchmark::DoNotOptimize(ReadPly(BenchmarkPath()));
   state.SetBytesProcessed(bytes * state.iterations());

@@ -1,6 +1,8 @@
 #include "common/mesh/ply_header.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -9,6 +11,7 @@
 #include <absl/strings/escaping.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <absl/strings/str_split.h>
 
 #include "common/base/check.h"
@@ -35,6 +38,14 @@ std::optional<ScalarType> ParseScalarType(const std::string& name) {
     if (known == name) return type;
   }
   return std::nullopt;
+}
+
+// That give back the same double: offsets are round numbers, for people to read.
+std::string RoundTripDigits(double value) {
+  std::string digits = absl::StrFormat("%.15g", value);
+  double read = 0;
+  std::from_chars(digits.data(), digits.data() + digits.size(), read);
+  return read == value ? digits : absl::StrFormat("%.17g", value);
 }
 
 // A piece of foreign text that can be shown on a terminal.
@@ -71,6 +82,17 @@ class Lines {
   size_t offset_ = 0;
   int number_ = 0;
 };
+
+std::optional<Eigen::Vector3d> ParseOffset(const std::vector<std::string>& words) {
+  if (words.size() != 5 || words[0] != "comment" || words[1] != "offset") return std::nullopt;
+  Eigen::Vector3d offset;
+  for (int k = 0; k < 3; ++k) {
+    const std::string& word = words[static_cast<size_t>(k) + 2];
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), offset[k]);
+    if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(offset[k])) return std::nullopt;
+  }
+  return offset;
+}
 
 absl::StatusOr<Encoding> ParseEncoding(const std::vector<std::string>& words, const Lines& lines,
                                        const std::string& line) {
@@ -142,6 +164,7 @@ absl::StatusOr<Header> ParseHeader(const std::string& bytes, const std::string& 
   while (true) {
     MW_ASSIGN_OR_RETURN(const std::string line, lines.Next("a line of the header, up to \"end_header\""));
     const std::vector<std::string> words = absl::StrSplit(line, absl::ByAnyChar(" \t"), absl::SkipEmpty());
+    if (const auto offset = ParseOffset(words)) header.world_offset = offset;
     if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
     if (!has_encoding) {
       MW_ASSIGN_OR_RETURN(header.encoding, ParseEncoding(words, lines, line));
@@ -175,9 +198,15 @@ std::string FormatHeader(const PlyAttributes& attributes, int64_t vertices, int6
   constexpr size_t kDigits = 38;
   MW_CHECK(counts[0].size() + counts[1].size() <= kDigits);
   const std::string padding(kDigits - counts[0].size() - counts[1].size(), ' ');
-  std::string header =
-      absl::StrCat("ply\nformat binary_little_endian 1.0\ncomment Meshwright", padding, "\nelement vertex ", counts[0],
-                   "\nproperty float x\nproperty float y\nproperty float z\n");
+  const std::string type = attributes.has_offset() ? "double" : "float";
+  std::string header = absl::StrCat("ply\nformat binary_little_endian 1.0\ncomment Meshwright", padding, "\n");
+  if (attributes.has_offset()) {
+    absl::StrAppend(&header, "comment offset");
+    for (const double component : attributes.offset) absl::StrAppend(&header, " ", RoundTripDigits(component));
+    absl::StrAppend(&header, "\n");
+  }
+  absl::StrAppend(&header, "element vertex ", counts[0], "\nproperty ", type, " x\nproperty ", type, " y\nproperty ",
+                  type, " z\n");
   if (attributes.normals) absl::StrAppend(&header, "property float nx\nproperty float ny\nproperty float nz\n");
   if (attributes.colors) {
     absl::StrAppend(&header, "property uchar red\nproperty uchar green\nproperty uchar blue\n");

@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
 #include <absl/status/statusor.h>
 
 #include "common/mesh/ply.h"
@@ -38,6 +40,8 @@ struct Header {
   Encoding encoding = Encoding::kAscii;
   std::vector<Element> elements;
   size_t body_offset = 0;  // first byte behind the header
+  // Of "comment offset X Y Z".
+  std::optional<Eigen::Vector3d> world_offset = std::nullopt;
 
   const Element* Find(const std::string& element) const;
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -115,6 +116,22 @@ absl::StatusOr<VertexLayout> FindVertexLayout(const std::string& file, const Ele
   return layout;
 }
 
+// What positions are read less. Floats have no digits to be saved; doubles have, where they are far from zero.
+Eigen::Vector3d OffsetFor(const Element& element, const VertexLayout& layout,
+                          const std::optional<Eigen::Vector3d>& told, const std::vector<double>& first_row) {
+  Eigen::Vector3d first;
+  for (int k = 0; k < 3; ++k) {
+    const auto column = static_cast<size_t>(layout.position[static_cast<size_t>(k)]);
+    if (element.properties[column].type != ScalarType::kFloat64) return Eigen::Vector3d::Zero();
+    first[k] = first_row[column];
+  }
+  if (told.has_value()) return *told;
+  constexpr double kFar = 1e5;
+  constexpr double kRounding = 100;
+  if (!first.allFinite() || first.cwiseAbs().maxCoeff() < kFar) return Eigen::Vector3d::Zero();
+  return (first / kRounding).array().round().matrix() * kRounding;
+}
+
 uint8_t ColorFrom(double value, ScalarType type) {
   const double scaled = ply::IsFloatingPoint(type) ? value * 255 : value;
   if (!(scaled > 0)) return 0;
@@ -133,7 +150,7 @@ absl::Status AppendVertex(const std::string& file, const Element& element, const
   Eigen::Vector3f position;
   for (int k = 0; k < 3; ++k) {
     const double coordinate = value(layout.position[k]);
-    position[k] = static_cast<float>(coordinate);
+    position[k] = static_cast<float>(coordinate - mesh.offset[k]);
     if (!std::isfinite(position[k])) {
       return BadValue(file, element.name, index, std::string(1, "xyz"[k]),
                       absl::StrCat(coordinate, ", expected a finite number within the range of a float"));
@@ -165,7 +182,8 @@ absl::Status AppendVertex(const std::string& file, const Element& element, const
 }
 
 template <typename Values>
-absl::Status ReadVertices(const std::string& file, const Element& element, Values& values, TriangleMesh& mesh) {
+absl::Status ReadVertices(const std::string& file, const Element& element, const std::optional<Eigen::Vector3d>& offset,
+                          Values& values, TriangleMesh& mesh) {
   MW_ASSIGN_OR_RETURN(const VertexLayout layout, FindVertexLayout(file, element));
   MW_RETURN_IF_ERROR(CheckCount(file, element, values));
   if (element.count > std::numeric_limits<uint32_t>::max()) {
@@ -190,6 +208,7 @@ absl::Status ReadVertices(const std::string& file, const Element& element, Value
       }
       if (!read) return BadValue(file, element.name, index, property.name, values.DescribeFault());
     }
+    if (index == 0) mesh.offset = OffsetFor(element, layout, offset, row);
     MW_RETURN_IF_ERROR(AppendVertex(file, element, layout, index, row, mesh));
   }
   return absl::OkStatus();
@@ -259,7 +278,7 @@ absl::StatusOr<TriangleMesh> ReadBody(const std::string& file, const Header& hea
   TriangleMesh mesh;
   for (const Element& element : header.elements) {
     if (&element == vertex) {
-      MW_RETURN_IF_ERROR(ReadVertices(file, element, values, mesh));
+      MW_RETURN_IF_ERROR(ReadVertices(file, element, header.world_offset, values, mesh));
     } else if (element.name == "face" && element.count > 0) {
       MW_RETURN_IF_ERROR(ReadFaces(file, element, vertex->count, values, mesh));
     } else {

@@ -29,8 +29,9 @@ constexpr size_t kFaceBytes = 1 + 3 * sizeof(uint32_t);
 constexpr size_t kCopyBytes = size_t{1} << 20;
 
 size_t VertexBytes(const PlyAttributes& attributes) {
-  return 3 * sizeof(float) + (attributes.normals ? 3 * sizeof(float) : 0) + (attributes.colors ? 3 : 0) +
-         (attributes.quality ? sizeof(float) : 0) + (attributes.cameras ? sizeof(int32_t) : 0);
+  return 3 * (attributes.has_offset() ? sizeof(double) : sizeof(float)) + (attributes.normals ? 3 * sizeof(float) : 0) +
+         (attributes.colors ? 3 : 0) + (attributes.quality ? sizeof(float) : 0) +
+         (attributes.cameras ? sizeof(int32_t) : 0);
 }
 
 char* StoreVector(const Eigen::Vector3f& vector, char* out) {
@@ -39,7 +40,13 @@ char* StoreVector(const Eigen::Vector3f& vector, char* out) {
 }
 
 char* StoreVertex(const TriangleMesh& mesh, const PlyAttributes& attributes, size_t i, char* out) {
-  out = StoreVector(mesh.positions[i], out);
+  if (attributes.has_offset()) {
+    for (int k = 0; k < 3; ++k) {
+      out = StoreLittleEndian(static_cast<double>(mesh.positions[i][k]) + attributes.offset[k], out);
+    }
+  } else {
+    out = StoreVector(mesh.positions[i], out);
+  }
   if (attributes.normals) out = StoreVector(mesh.normals[i], out);
   if (attributes.colors) {
     for (const uint8_t channel : mesh.colors[i]) out = StoreLittleEndian(channel, out);
@@ -117,7 +124,8 @@ absl::Status WritePly(const TriangleMesh& mesh, const std::string& path) {
   const PlyAttributes attributes{.normals = !mesh.normals.empty(),
                                  .colors = !mesh.colors.empty(),
                                  .quality = !mesh.quality.empty(),
-                                 .cameras = !mesh.cameras.empty()};
+                                 .cameras = !mesh.cameras.empty(),
+                                 .offset = mesh.offset};
   MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
   MW_RETURN_IF_ERROR(file.Append(ply::FormatHeader(attributes, static_cast<int64_t>(mesh.positions.size()),
                                                    static_cast<int64_t>(mesh.faces.size()))));

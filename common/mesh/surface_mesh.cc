@@ -35,8 +35,10 @@ TriangleMesh MeshOfSurface(const SparseSurface& surface) {
   return mesh;
 }
 
-absl::Status WriteSurfacePart(const SparseSurface& surface, const std::string& path) {
-  return WritePly(MeshOfSurface(surface), path);
+absl::Status WriteSurfacePart(const SparseSurface& surface, const Eigen::Vector3d& offset, const std::string& path) {
+  TriangleMesh mesh = MeshOfSurface(surface);
+  mesh.offset = offset;
+  return WritePly(mesh, path);
 }
 
 }  // namespace meshwright

@@ -15,9 +15,10 @@ TriangleMesh MeshOfSurface(const SparseSurface& surface);
 inline TriangleMesh MeshOfSurface(const PatchLattice& surface) { return MeshOfSurface(SparseSurface::From(surface)); }
 
 // Writes one surface as a PLY file of its own.
-absl::Status WriteSurfacePart(const SparseSurface& surface, const std::string& path);
-inline absl::Status WriteSurfacePart(const PatchLattice& surface, const std::string& path) {
-  return WriteSurfacePart(SparseSurface::From(surface), path);
+absl::Status WriteSurfacePart(const SparseSurface& surface, const Eigen::Vector3d& offset, const std::string& path);
+inline absl::Status WriteSurfacePart(const PatchLattice& surface, const Eigen::Vector3d& offset,
+                                     const std::string& path) {
+  return WriteSurfacePart(SparseSurface::From(surface), offset, path);
 }
 
 }  // namespace meshwright

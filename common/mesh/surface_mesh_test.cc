@@ -54,7 +54,7 @@ TEST_F(SurfaceMeshTest, MeshOfASurfaceHasItsTrianglesAndNoLooseVertex) {
 
 TEST_F(SurfaceMeshTest, PartIsWrittenWhole) {
   const PatchLattice surface = RandomSurface(3, SmallCamera(40, 25), 1, 0.8, 0.9);
-  ASSERT_TRUE(WriteSurfacePart(surface, Path("part.ply")).ok());
+  ASSERT_TRUE(WriteSurfacePart(surface, Eigen::Vector3d::Zero(), Path("part.ply")).ok());
   const auto part = ReadPly(Path("part.ply"));
   ASSERT_TRUE(part.ok()) << part.status();
   const TriangleMesh mesh = MeshOfSurface(surface);

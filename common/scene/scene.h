@@ -34,6 +34,10 @@ struct Scene {
   std::string format;  // the name of one of SceneFormats()
   std::vector<SceneView> views;
   std::vector<SparsePoint> points;
+  // What poses and points of the file were moved by: world = local + offset. Not 0 where the file's coordinates are far
+  // from it (UTM, ECEF), as surfaces and most formats of meshes have floats. Outside of this struct everything is local
+  // until a mesh is written.
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
   // What was left out or doubted when the scene was read, a line each; for people, no part of what the scene is.
   std::vector<std::string> warnings = {};
 };

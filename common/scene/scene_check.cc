@@ -71,9 +71,17 @@ absl::StatusOr<std::string> CheckAndDigestScene(const Scene& scene, ThreadPool& 
     for (const double value : {view.lens.fx, view.lens.fy, view.lens.cx, view.lens.cy, view.lens.skew}) {
       digest.Add(value);
     }
-    for (const double value : view.lens.coefficients) digest.Add(value);
+    // Those that models have had from the start; the others where there are any.
+    constexpr size_t kAlways = 8;
+    for (size_t k = 0; k < view.lens.coefficients.size(); ++k) {
+      if (k < kAlways || view.lens.coefficients[k] != 0) digest.Add(view.lens.coefficients[k]);
+    }
     for (const double value : view.cam_from_world.rotation.reshaped()) digest.Add(value);
     for (const double value : view.cam_from_world.translation) digest.Add(value);
+  }
+  // Left out where it is 0, so that work begun by versions that knew none goes on.
+  if (!scene.offset.isZero(0)) {
+    for (const double value : scene.offset) digest.Add(value);
   }
   for (const SparsePoint& point : scene.points) {
     for (const double value : point.x_in_world) digest.Add(value);

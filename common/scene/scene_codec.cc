@@ -4,6 +4,7 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <absl/types/span.h>
 
 #include "common/base/digest.h"
 #include "common/base/little_endian.h"
@@ -12,10 +13,12 @@
 namespace meshwright {
 namespace {
 
-constexpr char kMagic[] = "MWSCENE1";  // the last digit is the version
+constexpr char kMagic[] = "MWSCENE2";        // the last digit is the version
+constexpr char kMagicBefore[] = "MWSCENE1";  // no offset, fewer coefficients
 constexpr size_t kMagicSize = 8;
 constexpr size_t kDigestSize = 64;
-constexpr int kLastModel = static_cast<int>(Lens::Model::kThinPrismFisheye);
+constexpr int kLastModel = static_cast<int>(Lens::Model::kEucm);
+constexpr size_t kCoefficientsBefore = 8;  // of a lens, in version 1
 
 void AppendText(const std::string& text, std::string& out) {
   AppendLittleEndian(static_cast<uint32_t>(text.size()), out);
@@ -83,7 +86,7 @@ class Reader {
   bool ok_ = true;
 };
 
-bool ReadView(Reader& reader, SceneView& view) {
+bool ReadView(Reader& reader, bool is_before, SceneView& view) {
   view.name = ToUtf8(reader.NextText());
   view.image_path = reader.NextText();
   Lens& lens = view.lens;
@@ -93,7 +96,7 @@ bool ReadView(Reader& reader, SceneView& view) {
   lens.width = reader.Next<int32_t>();
   lens.height = reader.Next<int32_t>();
   for (double* value : {&lens.fx, &lens.fy, &lens.cx, &lens.cy, &lens.skew}) *value = reader.Next<double>();
-  reader.NextDoubles(lens.coefficients);
+  reader.NextDoubles(absl::MakeSpan(lens.coefficients).first(is_before ? kCoefficientsBefore : 12));
   reader.NextDoubles(view.cam_from_world.rotation.reshaped());
   reader.NextDoubles(view.cam_from_world.translation);
   return lens.width > 0 && lens.height > 0;
@@ -116,6 +119,7 @@ bool ReadPoint(Reader& reader, size_t views, SparsePoint& point) {
 std::string EncodeScene(const Scene& scene) {
   std::string out(kMagic, kMagicSize);
   AppendText(scene.format, out);
+  AppendDoubles(scene.offset, out);
   AppendLittleEndian(static_cast<uint32_t>(scene.views.size()), out);
   for (const SceneView& view : scene.views) AppendView(view, out);
   AppendLittleEndian(static_cast<uint32_t>(scene.points.size()), out);
@@ -129,8 +133,10 @@ std::string EncodeScene(const Scene& scene) {
 }
 
 absl::StatusOr<Scene> DecodeScene(const std::string& bytes) {
-  if (bytes.size() < kMagicSize + kDigestSize || bytes.compare(0, kMagicSize, kMagic) != 0) {
-    return absl::InvalidArgumentError(absl::StrCat("scene: not a scene of version 1 (", bytes.size(), " bytes)"));
+  const bool is_before = bytes.compare(0, kMagicSize, kMagicBefore) == 0;
+  const bool is_known = is_before || bytes.compare(0, kMagicSize, kMagic) == 0;
+  if (bytes.size() < kMagicSize + kDigestSize || !is_known) {
+    return absl::InvalidArgumentError(absl::StrCat("scene: not a scene of version 1 or 2 (", bytes.size(), " bytes)"));
   }
   const std::string body = bytes.substr(0, bytes.size() - kDigestSize);
   if (bytes.compare(body.size(), kDigestSize, Sha256Hex(body)) != 0) {
@@ -140,9 +146,10 @@ absl::StatusOr<Scene> DecodeScene(const std::string& bytes) {
   Reader reader(body.data() + kMagicSize, body.data() + body.size());
   Scene scene;
   scene.format = reader.NextText();
+  if (!is_before) reader.NextDoubles(scene.offset);
   scene.views.resize(reader.NextCount(1));
   for (SceneView& view : scene.views) {
-    if (!ReadView(reader, view)) return malformed;
+    if (!ReadView(reader, is_before, view)) return malformed;
   }
   scene.points.resize(reader.NextCount(1));
   for (SparsePoint& point : scene.points) {

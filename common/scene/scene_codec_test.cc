@@ -23,6 +23,7 @@ Scene SmallScene() {
   }
   scene.points.push_back({.x_in_world = {0.1, 0.2, 0.3}, .rgb = {1, 2, 255}, .seen_by = {0, 2}});
   scene.points.push_back({});
+  scene.offset = {500000, 1.0 / 3, -4e6};
   return scene;
 }
 
@@ -39,6 +40,7 @@ TEST(SceneCodecTest, EveryValueComesBack) {
   EXPECT_EQ(decoded->views[2].cam_from_world.rotation, scene.views[2].cam_from_world.rotation);
   EXPECT_EQ(decoded->points[0].seen_by, scene.points[0].seen_by);
   EXPECT_EQ(decoded->points[0].x_in_world, scene.points[0].x_in_world);
+  EXPECT_EQ(decoded->offset, scene.offset);
 }
 
 TEST(SceneCodecTest, TruncatedOrFlippedBytesAreRefused) {

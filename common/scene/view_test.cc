@@ -21,7 +21,7 @@ struct LensCase {
   Lens lens;
 };
 
-Lens MakeLens(Lens::Model model, std::array<double, 8> coefficients, double focal = 300) {
+Lens MakeLens(Lens::Model model, std::array<double, 12> coefficients, double focal = 300) {
   return {.width = 320,
           .height = 240,
           .fx = focal,

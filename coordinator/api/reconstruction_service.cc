@@ -454,6 +454,18 @@ absl::StatusOr<v1::ListAttemptsResponse> ReconstructionService::ListAttempts(
   return response;
 }
 
+absl::StatusOr<Eigen::Vector3d> ReconstructionService::OffsetOf(const std::string& id) const {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (const auto known = offsets_.find(id); known != offsets_.end()) return known->second;
+  }
+  const absl::StatusOr<Scene> scene = LoadScene(id);
+  if (absl::IsFailedPrecondition(scene.status())) return Eigen::Vector3d(Eigen::Vector3d::Zero());  // none taken yet
+  MW_RETURN_IF_ERROR(scene.status());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return offsets_[id] = scene->offset;
+}
+
 absl::StatusOr<v1::ListPartsResponse> ReconstructionService::ListParts(const std::string& id,
                                                                        SequenceNumber after) const {
   MW_RETURN_IF_ERROR(Find(id).status());
@@ -462,6 +474,9 @@ absl::StatusOr<v1::ListPartsResponse> ReconstructionService::ListParts(const std
   for (const Commit& commit : commits) {
     if (!commit.accepted_digest.empty()) FillPart(commit, *response.add_parts());
   }
+  if (response.parts().empty()) return response;
+  MW_ASSIGN_OR_RETURN(const Eigen::Vector3d offset, OffsetOf(id));
+  if (!offset.isZero(0)) response.mutable_offset()->Assign(offset.begin(), offset.end());
   return response;
 }
 

@@ -72,6 +72,8 @@ class ReconstructionService {
   absl::StatusOr<Scene> LoadScene(const std::string& id) const;
   absl::StatusOr<v1::GetIncidenceResponse> GetIncidence(const std::string& id) const;
   // Those with a sequence greater than `after`.
+  // Scene::offset; 0 before the scene was taken.
+  absl::StatusOr<Eigen::Vector3d> OffsetOf(const std::string& id) const;
   absl::StatusOr<v1::ListPartsResponse> ListParts(const std::string& id, SequenceNumber after = 0) const;
   absl::StatusOr<v1::Part> GetPart(const std::string& id, SequenceNumber sequence) const;
   absl::StatusOr<v1::ListAttemptsResponse> ListAttempts(const v1::ListAttemptsRequest& request) const;
@@ -105,6 +107,7 @@ class ReconstructionService {
   const DriverEnvironment environment_;
   WorkerService& workers_;
   mutable std::mutex mutex_;
+  mutable std::map<std::string, Eigen::Vector3d> offsets_;  // of scenes that were looked at
   mutable std::condition_variable changed_;
   int64_t version_ = 0;                                                     // grows when something may have changed
   std::map<std::string, std::unique_ptr<ReconstructionDriver>> conducted_;  // here

@@ -16,11 +16,13 @@ namespace meshwright {
 
 absl::StatusOr<PatchLattice> LoadAcceptedSurface(BlobStore& blobs, const AcceptedSurface& surface);
 
-// The last step of a reconstruction: the mesh of its accepted surfaces, in the order of their commits. `part_done`
+// The last step of a reconstruction: the mesh of its accepted surfaces, in the order of their commits, with
+// the scene's offset. `part_done`
 // is called twice per surface, one call at a time, on any thread.
 absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(
-    const std::vector<AcceptedSurface>& surfaces, BlobStore& blobs, const JoinOptions& options, const std::string& path,
-    ThreadPool& pool, const std::function<void()>& part_done = [] {});
+    const std::vector<AcceptedSurface>& surfaces, BlobStore& blobs, const JoinOptions& options,
+    const Eigen::Vector3d& offset, const std::string& path, ThreadPool& pool,
+    const std::function<void()>& part_done = [] {});
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -195,6 +195,7 @@ absl::Status ReconstructionDriver::PrepareScene(const ReconstructionConfig& conf
     photographs_[view.image_path] = view.name;
   }
   points_ = std::move(scene.points);
+  offset_ = scene.offset;
   return absl::OkStatus();
 }
 
@@ -302,7 +303,7 @@ absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionC
   absl::StatusOr<JoinedMeshCounts> counts = absl::UnknownError("not tried");
   for (int attempt = 0; attempt < kMaxRepairsInARow && !counts.ok(); ++attempt) {
     LostBlobNamer blobs(*environment_.blobs);
-    counts = WriteAcceptedMesh(conductor.AcceptedSurfaces(), blobs, config.join, path, *environment_.pool);
+    counts = WriteAcceptedMesh(conductor.AcceptedSurfaces(), blobs, config.join, offset_, path, *environment_.pool);
     if (counts.ok()) break;
     const std::string lost = LostBlobOf(counts.status());
     if (lost.empty()) return counts.status();

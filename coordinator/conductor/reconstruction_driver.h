@@ -93,7 +93,8 @@ class ReconstructionDriver {
   ReferencedBlobs referenced_blobs_;
   std::vector<Camera> cameras_;
   std::vector<SparsePoint> points_;
-  std::map<std::string, std::string> photographs_;  // digest -> name
+  Eigen::Vector3d offset_ = Eigen::Vector3d::Zero();  // of the scene
+  std::map<std::string, std::string> photographs_;    // digest -> name
 
   std::atomic<bool> has_ended_{false};
   mutable std::mutex mutex_;

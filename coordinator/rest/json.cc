@@ -29,8 +29,7 @@ void MakeUtf8(google::protobuf::Message& message) {
     for (int i = 0; field->is_repeated() && i < reflection.FieldSize(message, field); ++i) {
       if (is_message) MakeUtf8(*reflection.MutableRepeatedMessage(&message, field, i));
       if (is_text) {
-        reflection.SetRepeatedString(&message, field, i,
-                                     ToUtf8(reflection.GetRepeatedString(message, field, i)));
+        reflection.SetRepeatedString(&message, field, i, ToUtf8(reflection.GetRepeatedString(message, field, i)));
       }
     }
     if (field->is_repeated()) continue;
@@ -71,7 +70,8 @@ absl::Status FromJson(const std::string& json, google::protobuf::Message& messag
     nlohmann::json single = nlohmann::json::object();
     if (!value.is_structured()) single[name] = value;
     const std::unique_ptr<google::protobuf::Message> parsed(message.New());
-    const bool taken = !single.empty() && google::protobuf::util::JsonStringToMessage(JsonText(single), parsed.get()).ok();
+    const bool taken =
+        !single.empty() && google::protobuf::util::JsonStringToMessage(JsonText(single), parsed.get()).ok();
     if (!taken) {
       const std::string said = value.is_structured() ? value.type_name() : JsonText(value).substr(0, 64);
       return FieldError(

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include "common/base/digest.h"
 #include "common/base/status_macros.h"
@@ -37,13 +38,20 @@ absl::Status ListParts(const RestContext& context, RestCall& call) {
   return absl::OkStatus();
 }
 
+// "" for none.
+std::string TextOf(const Eigen::Vector3d& offset) {
+  return offset.isZero(0) ? "" : absl::StrFormat("-%.17g-%.17g-%.17g", offset.x(), offset.y(), offset.z());
+}
+
 absl::Status DownloadPart(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const v1::Part part, FindPart(context, call));
-  const std::string key = absl::StrCat("part-", part.sha256());
+  // The same surface in a scene that was moved is another file.
+  MW_ASSIGN_OR_RETURN(const Eigen::Vector3d offset, context.reconstructions->OffsetOf(call.path.at("id")));
+  const std::string key = absl::StrCat("part-", part.sha256(), TextOf(offset));
   MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& path) -> absl::Status {
     MW_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->Get(part.sha256()));
     MW_ASSIGN_OR_RETURN(const PatchLattice surface, DecodeSurface(bytes));
-    return WriteSurfacePart(surface, path);
+    return WriteSurfacePart(surface, offset, path);
   }));
   return SendFile(call, std::move(file), key, kPlyType, absl::StrCat(call.path.at("id"), "-", part.sequence(), ".ply"));
 }
@@ -66,11 +74,17 @@ absl::Status PreviewPart(const RestContext& context, RestCall& call) {
   });
 }
 
+Eigen::Vector3d OffsetOf(const v1::ListPartsResponse& parts) {
+  if (parts.offset_size() != 3) return Eigen::Vector3d::Zero();
+  return {parts.offset(0), parts.offset(1), parts.offset(2)};
+}
+
 // One surface in memory at a time.
 absl::Status WriteUnion(const v1::ListPartsResponse& parts, BlobStore& blobs, const std::string& path) {
   MW_ASSIGN_OR_RETURN(
       PlyStreamWriter writer,
-      PlyStreamWriter::Create(path, {.normals = true, .colors = true, .quality = true, .cameras = true}));
+      PlyStreamWriter::Create(
+          path, {.normals = true, .colors = true, .quality = true, .cameras = true, .offset = OffsetOf(parts)}));
   for (const v1::Part& part : parts.parts()) {
     MW_ASSIGN_OR_RETURN(const std::string bytes, blobs.Get(part.sha256()));
     MW_ASSIGN_OR_RETURN(const PatchLattice surface, DecodeSurface(bytes));
@@ -95,7 +109,7 @@ absl::Status SendPartialMesh(const RestContext& context, RestCall& call, const M
   MW_ASSIGN_OR_RETURN(const v1::ListPartsResponse parts, context.reconstructions->ListParts(id));
   std::string digests;
   for (const v1::Part& part : parts.parts()) digests += part.sha256();
-  const std::string key = absl::StrCat("union-", format.name, "-", Sha256Hex(digests));
+  const std::string key = absl::StrCat("union-", format.name, "-", Sha256Hex(digests), TextOf(OffsetOf(parts)));
   MW_ASSIGN_OR_RETURN(auto file, context.derived->Get(key, [&](const std::string& to) -> absl::Status {
     if (IsPly(format)) return WriteUnion(parts, *context.blobs, to);
     const std::string ply = to + ".ply";

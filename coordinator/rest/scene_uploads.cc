@@ -17,12 +17,9 @@
 #include "common/base/files.h"
 #include "common/base/relative_path.h"
 #include "common/base/status_macros.h"
-<<<<<<< HEAD
 #include "common/blob/blob_store.h"
-#include "common/json/parse_json.h"
-=======
 #include "common/json/json_text.h"
->>>>>>> 1447bf9 (Make names of files UTF-8 where they become names of photographs)
+#include "common/json/parse_json.h"
 #include "coordinator/api/reconstruction_record.h"
 #include "coordinator/rest/problem.h"
 
@@ -59,21 +56,12 @@ absl::Status WrongDigest(const std::string& field, const std::string& said, cons
 }
 
 std::string Encode(const SceneFileState& state) {
-<<<<<<< HEAD
-  return nlohmann::json({{"path", state.path},
-                         {"size_bytes", state.size_bytes},
-                         {"sha256", state.sha256},
-                         {"offset_bytes", state.offset_bytes},
-                         {"complete", state.complete},
-                         {"staged_name", state.staged_name}})
-      .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
-=======
   return JsonText(nlohmann::json({{"path", state.path},
                                   {"size_bytes", state.size_bytes},
                                   {"sha256", state.sha256},
                                   {"offset_bytes", state.offset_bytes},
-                                  {"complete", state.complete}}));
->>>>>>> 1447bf9 (Make names of files UTF-8 where they become names of photographs)
+                                  {"complete", state.complete},
+                                  {"staged_name", state.staged_name}}));
 }
 
 template <typename Value>

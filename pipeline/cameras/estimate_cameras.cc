@@ -19,8 +19,6 @@
 #include <absl/time/time.h>
 #include <nlohmann/json.hpp>
 
-#include "common/base/utf8.h"
-#include "common/json/json_text.h"
 #include "pipeline/cameras/camera_groups.h"
 #include "pipeline/cameras/child_process.h"
 #include "pipeline/cameras/colmap_database.h"
@@ -32,6 +30,8 @@
 #include "common/base/folder_lock.h"
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
+#include "common/base/utf8.h"
+#include "common/json/json_text.h"
 #include "common/scene/formats/import.h"
 
 namespace meshwright {

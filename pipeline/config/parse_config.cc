@@ -1,9 +1,9 @@
 #include "pipeline/config/parse_config.h"
 
-#include "common/json/json_text.h"
 #include "pipeline/options/options_json.h"
 
 #include "common/base/status_macros.h"
+#include "common/json/json_text.h"
 #include "worker/job_input/camera_job_input.h"
 
 namespace meshwright {

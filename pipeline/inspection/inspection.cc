@@ -81,6 +81,7 @@ absl::StatusOr<Inspection> Inspect(const Scene& scene, const ReconstructionOptio
   }
   inspection.format = scene.format;
   inspection.warnings = scene.warnings;
+  inspection.offset = scene.offset;
   inspection.photographs = static_cast<int>(scene.views.size());
   inspection.width = width.range();
   inspection.height = height.range();
@@ -103,6 +104,7 @@ Json ToJson(const Inspection& inspection) {
   return {
       {"format", inspection.format},
       {"warnings", inspection.warnings},
+      {"offset", {inspection.offset.x(), inspection.offset.y(), inspection.offset.z()}},
       {"photographs", inspection.photographs},
       {"width", RangeToJson(inspection.width)},
       {"height", RangeToJson(inspection.height)},
@@ -127,6 +129,10 @@ std::string ToText(const Inspection& inspection) {
   std::string text;
   absl::StrAppendFormat(&text, "scene      %s, %d photographs, %d sparse points\n", inspection.format,
                         inspection.photographs, inspection.sparse_points);
+  if (!inspection.offset.isZero(0)) {
+    absl::StrAppendFormat(&text, "           far from zero: computed relative to %.10g %.10g %.10g\n",
+                          inspection.offset.x(), inspection.offset.y(), inspection.offset.z());
+  }
   absl::StrAppendFormat(&text, "size       width %s, height %s px; %.1f million pixels\n",
                         RangeToText(inspection.width), RangeToText(inspection.height),
                         1e-6 * static_cast<double>(inspection.pixels));

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
 #include <absl/status/statusor.h>
 #include <nlohmann/json.hpp>
 
@@ -24,6 +25,7 @@ struct SizeRange {
 struct Inspection {
   std::string format;
   std::vector<std::string> warnings;  // of the scene: what was left out of it, and other scenes in the folder
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // Scene::offset
   int photographs = 0;
   SizeRange width;   // px, as used: undistorted and scaled
   SizeRange height;  // px

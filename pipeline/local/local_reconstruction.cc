@@ -11,7 +11,6 @@
 #include <absl/strings/str_format.h>
 #include <absl/time/clock.h>
 
-#include "common/json/json_text.h"
 #include "pipeline/local/report.h"
 #include "pipeline/local/work_folder.h"
 #include "pipeline/options/options_json.h"
@@ -22,6 +21,7 @@
 #include "common/base/files.h"
 #include "common/base/process_usage.h"
 #include "common/base/status_macros.h"
+#include "common/json/json_text.h"
 #include "common/mesh/formats/mesh_format.h"
 #include "common/mesh/surface_mesh.h"
 #include "common/scene/scene_check.h"
@@ -104,7 +104,7 @@ absl::Status WriteParts(const Scene& scene, const std::vector<AcceptedSurface>& 
                         const std::string& folder) {
   for (const AcceptedSurface& accepted : surfaces) {
     MW_ASSIGN_OR_RETURN(const PatchLattice surface, LoadAcceptedSurface(blobs, accepted));
-    MW_RETURN_IF_ERROR(WriteSurfacePart(surface, absl::StrCat(folder, "/", PartName(scene, accepted))));
+    MW_RETURN_IF_ERROR(WriteSurfacePart(surface, scene.offset, absl::StrCat(folder, "/", PartName(scene, accepted))));
   }
   return absl::OkStatus();
 }
@@ -241,8 +241,8 @@ class LocalReconstruction {
     int loaded = 0;  // each at least twice
     const auto loading = [&] { Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count); };
     const std::string ply_path = IsPly(*format_) ? settings_.output_path : work_->MeshPath();
-    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts,
-                        WriteAcceptedMesh(surfaces, work_->blobs(), options_.join, ply_path, pool_, loading));
+    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts, WriteAcceptedMesh(surfaces, work_->blobs(), options_.join,
+                                                                         scene_.offset, ply_path, pool_, loading));
     if (counts.faces == 0) {
       std::error_code error;
       fs::remove(ply_path, error);
@@ -293,6 +293,8 @@ class LocalReconstruction {
                        {"photographs", scene_.views.size()},
                        {"sparse_points", scene_.points.size()},
                        {"pairs", PairsToJson(*conductor_)}};
+    // world = local + offset
+    if (!scene_.offset.isZero(0)) report["scene"]["offset"] = {scene_.offset.x(), scene_.offset.y(), scene_.offset.z()};
     report["options"] = ToJson(options_);
     report["options"].erase("version");
     report["totals"] = std::move(cameras["totals"]);

@@ -5,10 +5,10 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "common/json/json_text.h"
 #include "pipeline/options/option_table.h"
 
 #include "common/base/status_macros.h"
+#include "common/json/json_text.h"
 #include "common/json/parse_json.h"
 
 namespace meshwright {

@@ -109,7 +109,7 @@ class Texturing {
     report_.pages = static_cast<int64_t>(layout.pages.size());
     for (const PageSize& page : layout.pages) report_.page_pixels += int64_t{page.width} * page.height;
     MW_ASSIGN_OR_RETURN(const auto writer,
-                        TexturedMeshWriter::Create(format, path, CutParts(layout),
+                        TexturedMeshWriter::Create(format, path, CutParts(layout), scene_.offset,
                                                    {.png = options_.png, .jpeg_quality = options_.jpeg_quality}));
     MW_RETURN_IF_ERROR(DrawPages(layout, *writer));
     return writer->Commit();
@@ -283,12 +283,16 @@ absl::StatusOr<TextureReport> WriteTexturedMesh(TriangleMesh mesh, const Scene& 
                                                 const MeshFormat& format, const std::string& path, ThreadPool& pool,
                                                 const TextureProgress& progress, TriangleMesh* prepared) {
   MW_RETURN_IF_ERROR(options.Validate());
+  ChangeOffset(scene.offset, mesh);
   Texturing texturing(scene, options, pool, progress);
   MW_RETURN_IF_ERROR(texturing.Prepare(std::move(mesh)));
   MW_RETURN_IF_ERROR(texturing.Label());
   MW_RETURN_IF_ERROR(texturing.Level());
   MW_RETURN_IF_ERROR(texturing.Write(format, path));
-  if (prepared != nullptr) *prepared = std::move(texturing.mesh());
+  if (prepared != nullptr) {
+    *prepared = std::move(texturing.mesh());
+    prepared->offset = scene.offset;
+  }
   return texturing.report();
 }
 

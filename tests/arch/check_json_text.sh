@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Fails where JSON is made text by `dump`, which throws at bytes that are not UTF-8; common/json/json_text.h does not.
 # Usage: check_json_text.sh [ROOT]
 set -euo pipefail

@@ -97,6 +97,11 @@ absl::StatusOr<TexturedModel> Decode(const Glb& glb) {
                           DecodeImageBytes(glb.View(image.at("bufferView").get<size_t>()), "a picture in it"));
       model.pages.push_back(std::move(page));
     }
+    // The node turns the mesh half around X: its translation is the offset, turned alike.
+    if (const json& node = glb.gltf.at("nodes").at(0); node.contains("translation")) {
+      const auto translation = node.at("translation").get<std::array<double, 3>>();
+      model.mesh.offset = {translation[0], -translation[1], -translation[2]};
+    }
     for (const json& mesh : glb.gltf.at("meshes")) {
       for (const json& primitive : mesh.at("primitives")) MW_RETURN_IF_ERROR(AppendPart(glb, primitive, model));
     }

@@ -57,7 +57,7 @@ glb::Description Describe(const MeshRows& mesh) {
                                             glb::kElementArrayBuffer, description);
   }
   gltf["scenes"][0]["nodes"] = {0};
-  gltf["nodes"] = {{{"mesh", 0}, {"rotation", glb::YUpRotation()}}};
+  gltf["nodes"] = {glb::MeshNode(mesh.offset())};
   gltf["meshes"] = {{{"primitives", {primitive}}}};
   gltf["materials"] = {{{"doubleSided", true}, {"extensions", {{"KHR_materials_unlit", json::object()}}}}};
   gltf["extensionsUsed"] = {"KHR_materials_unlit"};

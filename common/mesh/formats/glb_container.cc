@@ -26,7 +26,14 @@ Description NewDescription() {
   return description;
 }
 
-json YUpRotation() { return {1, 0, 0, 0}; }
+json MeshNode(const Eigen::Vector3d& offset) {
+  json node = {{"mesh", 0}, {"rotation", {1, 0, 0, 0}}};
+  if (!offset.isZero(0)) {
+    node["translation"] = {offset.x(), -offset.y(), -offset.z()};
+    node["extras"] = {{"offset", {offset.x(), offset.y(), offset.z()}}};
+  }
+  return node;
+}
 
 size_t AddView(uint64_t bytes, int target, Description& description) {
   json view = {{"buffer", 0}, {"byteOffset", description.buffer_bytes}, {"byteLength", bytes}};

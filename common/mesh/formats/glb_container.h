@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include <Eigen/Core>
 #include <absl/status/statusor.h>
 #include <nlohmann/json.hpp>
 
@@ -26,8 +27,9 @@ struct Description {
 // asset, one scene, and nothing in it yet.
 Description NewDescription();
 
-// Half a turn about X: from a scene's Y down to glTF's Y up. For the node that carries the mesh.
-nlohmann::json YUpRotation();
+// The node that carries the scene's mesh: half a turn about X, from a scene's Y down to glTF's Y up, and the scene's
+// offset as its translation (and as it is in extras), so that vertices are floats near zero.
+nlohmann::json MeshNode(const Eigen::Vector3d& offset);
 
 // Adds a view of the next bytes of the buffer and returns its number. `target` 0: none.
 size_t AddView(uint64_t bytes, int target, Description& description);

@@ -21,16 +21,25 @@ struct Grid {
   Eigen::Vector3d offset;
   double scale = 1;
 
-  int32_t Number(float coordinate, int axis) const {
-    return static_cast<int32_t>(std::llround((static_cast<double>(coordinate) - offset[axis]) / scale));
+  int32_t Number(double coordinate, int axis) const {
+    return static_cast<int32_t>(std::llround((coordinate - offset[axis]) / scale));
   }
 };
 
-Grid GridOf(const MeshRows::Bounds& bounds) {
-  const Eigen::Vector3d low = bounds.low.cast<double>();
-  const Eigen::Vector3d high = bounds.high.cast<double>();
-  const Eigen::Vector3d centre = 0.5 * (low + high);
-  const double extent = std::max((high - low).maxCoeff(), std::numeric_limits<float>::min() * 1.0);
+// Of all vertices, as they are in the world.
+struct WorldBounds {
+  Eigen::Vector3d low;
+  Eigen::Vector3d high;
+};
+
+WorldBounds BoundsOf(const MeshRows& mesh) {
+  const MeshRows::Bounds bounds = mesh.FindBounds();
+  return {bounds.low.cast<double>() + mesh.offset(), bounds.high.cast<double>() + mesh.offset()};
+}
+
+Grid GridOf(const WorldBounds& bounds) {
+  const Eigen::Vector3d centre = 0.5 * (bounds.low + bounds.high);
+  const double extent = std::max((bounds.high - bounds.low).maxCoeff(), std::numeric_limits<float>::min() * 1.0);
   // Numbers of at most half an extent from the centre, and of the centre's rounding, have to fit into 31 bits.
   Grid grid;
   grid.scale = std::pow(10.0, std::ceil(std::log10(extent / (1 << 30))));
@@ -46,7 +55,7 @@ void AppendText(const char* text, size_t size, std::string& bytes) {
 }
 
 // Public header block; dates stay 0, so that the same mesh gives the same bytes.
-std::string Header(size_t points, const MeshRows::Bounds& bounds, const Grid& grid) {
+std::string Header(size_t points, const WorldBounds& bounds, const Grid& grid) {
   std::string header = "LASF";
   AppendLittleEndian(uint16_t{0}, header);  // file source
   AppendLittleEndian(uint16_t{0}, header);  // global encoding
@@ -76,7 +85,7 @@ std::string Header(size_t points, const MeshRows::Bounds& bounds, const Grid& gr
 }
 
 void AppendPoint(const MeshRows& mesh, const Grid& grid, size_t vertex, std::string& bytes) {
-  const Eigen::Vector3f x = mesh.Position(vertex);
+  const Eigen::Vector3d x = mesh.WorldPosition(vertex);
   for (int k = 0; k < 3; ++k) AppendLittleEndian(grid.Number(x[k], k), bytes);
   AppendLittleEndian(uint16_t{0}, bytes);  // intensity
   AppendLittleEndian(kOnlyReturn, bytes);
@@ -99,7 +108,7 @@ absl::Status WriteLas(const MeshRows& mesh, const std::string& path) {
     return absl::OutOfRangeError(
         absl::StrCat(path, ": the mesh has ", mesh.vertices(), " vertices, expected at most ", kMost, " in LAS 1.2"));
   }
-  const MeshRows::Bounds bounds = mesh.FindBounds();
+  const WorldBounds bounds = BoundsOf(mesh);
   const Grid grid = GridOf(bounds);
   MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
   MW_RETURN_IF_ERROR(file.Append(Header(mesh.vertices(), bounds, grid)));

@@ -24,6 +24,7 @@ absl::Status WritePlyRows(const MeshRows& mesh, const std::string& path) {
   MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, attributes));
   for (size_t begin = 0; begin < mesh.vertices(); begin += kRowsAtOnce) {
     TriangleMesh part;
+    part.offset = attributes.offset;
     for (size_t v = begin; v < std::min(mesh.vertices(), begin + kRowsAtOnce); ++v) {
       part.positions.push_back(mesh.Position(v));
       if (attributes.normals) part.normals.push_back(mesh.Normal(v));

@@ -64,6 +64,75 @@ TEST_F(MeshFormatTest, UnknownEndingsAreToldWithThoseThatThereAre) {
 
 TEST_F(MeshFormatTest, PlyStaysTheSameBytes) { EXPECT_EQ(Convert("copy.ply"), *ReadFile(At("mesh.ply"))); }
 
+// Far from zero, where floats are half a unit apart.
+class FarMeshTest : public MeshFormatTest {
+ protected:
+  FarMeshTest() {
+    mesh_.offset = {500000, 4000000, -1234567.5};
+    EXPECT_TRUE(WritePly(mesh_, At("mesh.ply")).ok());
+  }
+  Eigen::Vector3d World(size_t vertex) const { return mesh_.positions[vertex].cast<double>() + mesh_.offset; }
+};
+
+TEST_F(FarMeshTest, PlyHasDoublesAndGivesBackTheMesh) {
+  EXPECT_EQ(Convert("copy.ply"), *ReadFile(At("mesh.ply")));
+  EXPECT_THAT(Convert("copy.ply").substr(0, 200), HasSubstr("comment offset 500000 4000000 -1234567.5\n"));
+  const TriangleMesh parsed = *ReadPly(At("mesh.ply"));
+  const auto mapped = MeshRows::OpenPly(At("mesh.ply"));
+  ASSERT_TRUE(mapped.ok()) << mapped.status();
+  EXPECT_EQ(parsed.offset, mesh_.offset);
+  EXPECT_EQ(mapped->offset(), mesh_.offset);
+  for (size_t v = 0; v < mesh_.positions.size(); ++v) {
+    EXPECT_LT((parsed.positions[v] - mesh_.positions[v]).norm(), 1e-6F);
+    EXPECT_EQ(mapped->Position(v), parsed.positions[v]);
+    EXPECT_LT((mapped->WorldPosition(v) - World(v)).norm(), 1e-8);
+  }
+}
+
+TEST_F(FarMeshTest, DoublesOfOthersAreReadLessAnOffset) {
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double z\n";
+  ASSERT_TRUE(
+      WriteFileAtomically(At("text.ply"), text + "end_header\n500012.25 4000003 1\n500012.375 4000002 2\n").ok());
+  const TriangleMesh mesh = *ReadPly(At("text.ply"));
+  EXPECT_EQ(mesh.offset, Eigen::Vector3d(500000, 4000000, 0));
+  EXPECT_EQ(mesh.positions[1], Eigen::Vector3f(12.375F, 2, 2));
+  ASSERT_TRUE(WriteFileAtomically(At("near.ply"), text + "end_header\n12.25 3 1\n12.375 2 2\n").ok());
+  EXPECT_EQ(ReadPly(At("near.ply"))->offset, Eigen::Vector3d::Zero());
+}
+
+TEST_F(FarMeshTest, GlbHasTheOffsetInItsNode) {
+  const std::string bytes = Convert("mesh.glb");
+  const auto json = nlohmann::json::parse(bytes.substr(20, LoadLittleEndian<uint32_t>(bytes.data() + 12)));
+  EXPECT_EQ(json["nodes"][0]["translation"], nlohmann::json({500000.0, -4000000.0, 1234567.5}));
+  EXPECT_EQ(json["nodes"][0]["extras"]["offset"], nlohmann::json({500000.0, 4000000.0, -1234567.5}));
+  EXPECT_LT(std::abs(json["accessors"][0]["max"][0].get<double>()), 1000);
+}
+
+TEST_F(FarMeshTest, ObjAndLasHaveTheWorldsCoordinates) {
+  std::istringstream obj(Convert("mesh.obj"));
+  std::string line;
+  std::getline(obj, line);
+  const std::string las = Convert("mesh.las");
+  for (size_t v = 0; v < mesh_.positions.size(); ++v) {
+    std::string word;
+    Eigen::Vector3d x;
+    std::getline(obj, line);
+    std::istringstream(line) >> word >> x.x() >> x.y() >> x.z();
+    EXPECT_LT((x - World(v)).norm(), 1e-8);
+    for (int k = 0; k < 3; ++k) {
+      const auto scale = LoadLittleEndian<double>(las.data() + 131 + 8 * k);
+      const auto offset = LoadLittleEndian<double>(las.data() + 155 + 8 * k);
+      const auto number = LoadLittleEndian<int32_t>(las.data() + 227 + 26 * v + 4 * static_cast<size_t>(k));
+      EXPECT_NEAR(number * scale + offset, World(v)[k], 1e-6);
+    }
+  }
+}
+
+TEST_F(FarMeshTest, StlTellsTheOffset) {
+  EXPECT_THAT(Convert("mesh.stl").substr(0, 80), HasSubstr("offset 500000 4000000 -1234567.5 "));
+}
+
 TEST_F(MeshFormatTest, AMappedFileAndOneThatIsParsedGiveTheSameRows) {
   std::string text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
   text += "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0.5\n3 0 1 2\n";

@@ -61,7 +61,8 @@ bool IsOurs(const Header& header, const std::string& head, PlyAttributes* attrib
   *attributes = {.normals = vertex->Find("nx") >= 0,
                  .colors = vertex->Find("red") >= 0,
                  .quality = vertex->Find("quality") >= 0,
-                 .cameras = vertex->Find("camera_index") >= 0};
+                 .cameras = vertex->Find("camera_index") >= 0,
+                 .offset = header.world_offset.value_or(Eigen::Vector3d::Zero())};
   const std::string ours =
       ply::FormatHeader(*attributes, static_cast<int64_t>(vertex->count), static_cast<int64_t>(face->count));
   return head.compare(0, header.body_offset, ours) == 0;
@@ -79,6 +80,7 @@ MeshRows::MeshRows(const TriangleMesh& mesh) {
   quality_ = column(mesh.quality);
   cameras_ = column(mesh.cameras);
   faces_ = column(mesh.faces);
+  offset_ = mesh.offset;
 }
 
 absl::StatusOr<MeshRows> MeshRows::OpenPly(const std::string& path) {
@@ -91,7 +93,8 @@ absl::StatusOr<MeshRows> MeshRows::OpenPly(const std::string& path) {
   if (header.ok() && IsOurs(*header, head, &attributes)) {
     const size_t vertices = header->Find("vertex")->count;
     const size_t faces = header->Find("face")->count;
-    const size_t vertex_bytes = 3 * sizeof(float) + (attributes.normals ? 3 * sizeof(float) : 0) +
+    const size_t position_bytes = 3 * (attributes.has_offset() ? sizeof(double) : sizeof(float));
+    const size_t vertex_bytes = position_bytes + (attributes.normals ? 3 * sizeof(float) : 0) +
                                 (attributes.colors ? 3 : 0) + (attributes.quality ? sizeof(float) : 0) +
                                 (attributes.cameras ? sizeof(CameraIndex) : 0);
     const auto mapped = MappedFile::Open(path);
@@ -106,7 +109,9 @@ absl::StatusOr<MeshRows> MeshRows::OpenPly(const std::string& path) {
         if (there) next += bytes;
         return column;
       };
-      rows.positions_ = take(true, 3 * sizeof(float));
+      rows.offset_ = attributes.offset;
+      rows.has_doubles_ = attributes.has_offset();
+      rows.positions_ = take(true, position_bytes);
       rows.normals_ = take(attributes.normals, 3 * sizeof(float));
       rows.colors_ = take(attributes.colors, 3);
       rows.quality_ = take(attributes.quality, sizeof(float));
@@ -144,8 +149,11 @@ absl::Status MeshRows::CheckRows(const std::string& path) const {
 }
 
 PlyAttributes MeshRows::attributes() const {
-  return {
-      .normals = has_normals(), .colors = has_colors(), .quality = quality_.count > 0, .cameras = cameras_.count > 0};
+  return {.normals = has_normals(),
+          .colors = has_colors(),
+          .quality = quality_.count > 0,
+          .cameras = cameras_.count > 0,
+          .offset = offset_};
 }
 
 MeshRows::Bounds MeshRows::FindBounds() const {

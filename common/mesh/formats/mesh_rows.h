@@ -31,17 +31,28 @@ class MeshRows {
   size_t faces() const { return faces_.count; }
   bool has_normals() const { return normals_.count > 0; }
   bool has_colors() const { return colors_.count > 0; }
-  // Of the four optional attributes.
+  // The four optional attributes that there are, and the offset.
   PlyAttributes attributes() const;
 
-  Eigen::Vector3f Position(size_t vertex) const { return positions_.Load<Eigen::Vector3f>(vertex); }
+  // Less offset(); scene units.
+  Eigen::Vector3f Position(size_t vertex) const {
+    if (!has_doubles_) return positions_.Load<Eigen::Vector3f>(vertex);
+    return (positions_.Load<Eigen::Vector3d>(vertex) - offset_).cast<float>();
+  }
+  // As it is in the world, with all digits that there are.
+  Eigen::Vector3d WorldPosition(size_t vertex) const {
+    if (has_doubles_) return positions_.Load<Eigen::Vector3d>(vertex);
+    return positions_.Load<Eigen::Vector3f>(vertex).cast<double>() + offset_;
+  }
+  const Eigen::Vector3d& offset() const { return offset_; }
+  bool has_offset() const { return !offset_.isZero(0); }
   Eigen::Vector3f Normal(size_t vertex) const { return normals_.Load<Eigen::Vector3f>(vertex); }
   std::array<uint8_t, 3> Color(size_t vertex) const { return colors_.Load<std::array<uint8_t, 3>>(vertex); }
   float Quality(size_t vertex) const { return quality_.Load<float>(vertex); }
   CameraIndex Camera(size_t vertex) const { return cameras_.Load<CameraIndex>(vertex); }
   std::array<uint32_t, 3> Face(size_t face) const { return faces_.Load<std::array<uint32_t, 3>>(face); }
 
-  // Bounds of the positions; there must be one.
+  // Bounds of the positions less the offset; there must be one.
   struct Bounds {
     Eigen::Vector3f low;
     Eigen::Vector3f high;
@@ -66,6 +77,8 @@ class MeshRows {
   MeshRows() = default;
   absl::Status CheckRows(const std::string& path) const;
 
+  Eigen::Vector3d offset_ = Eigen::Vector3d::Zero();
+  bool has_doubles_ = false;  // positions_ are doubles with the offset added, as our PLY files have them
   Column positions_;
   Column normals_;
   Column colors_;

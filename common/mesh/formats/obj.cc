@@ -9,7 +9,7 @@ namespace meshwright {
 namespace {
 
 void AppendVertex(const MeshRows& mesh, size_t vertex, std::string& text) {
-  obj::AppendNumbers("v", mesh.Position(vertex), text);
+  obj::AppendPosition(mesh.Position(vertex), mesh.offset(), text);
   if (mesh.has_colors()) {
     for (const uint8_t channel : mesh.Color(vertex)) obj::AppendNumber(static_cast<float>(channel) / 255.0F, text);
   }

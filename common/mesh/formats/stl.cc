@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include "common/mesh/formats/row_writer.h"
 
@@ -36,6 +37,10 @@ absl::Status WriteStl(const MeshRows& mesh, const std::string& path) {
         absl::StrCat(path, ": the mesh has ", mesh.faces(), " faces, expected at most ", kMost, " in STL"));
   }
   std::string head = "Meshwright";
+  if (mesh.has_offset()) {
+    const Eigen::Vector3d& offset = mesh.offset();
+    absl::StrAppend(&head, absl::StrFormat(" offset %.10g %.10g %.10g", offset.x(), offset.y(), offset.z()));
+  }
   head.resize(kHeaderBytes, ' ');
   AppendLittleEndian(static_cast<uint32_t>(mesh.faces()), head);
   MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));

@@ -8,7 +8,8 @@
 
 namespace meshwright {
 
-// Binary STL (3D Systems, 1988): triangles with their normals, nothing else. InvalidArgument for a mesh without faces,
+// Binary STL (3D Systems, 1988): triangles with their normals, nothing else. It has floats alone: coordinates are
+// less the mesh's offset, which the header tells ("Meshwright offset X Y Z"). InvalidArgument for a mesh without faces,
 // OutOfRange for more than 2^32 - 1 of them. The file appears whole or not at all.
 absl::Status WriteStl(const MeshRows& mesh, const std::string& path);
 

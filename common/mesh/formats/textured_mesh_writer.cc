@@ -25,8 +25,13 @@ std::string Encode(const ColorImage& page, const TexturePictures& pictures) {
 // The description comes first in a GLB, and says how long the pictures are: room is kept for it until they are known.
 class GlbWriter final : public TexturedMeshWriter {
  public:
-  GlbWriter(std::string path, std::vector<TexturePart> parts, const TexturePictures& pictures, AtomicFile file)
-      : path_(std::move(path)), parts_(std::move(parts)), pictures_(pictures), file_(std::move(file)) {}
+  GlbWriter(std::string path, std::vector<TexturePart> parts, const Eigen::Vector3d& offset,
+            const TexturePictures& pictures, AtomicFile file)
+      : path_(std::move(path)),
+        parts_(std::move(parts)),
+        offset_(offset),
+        pictures_(pictures),
+        file_(std::move(file)) {}
 
   absl::Status Begin() {
     constexpr uint64_t kLongest = 999'999'999;  // bytes of a picture, as long as a number can be
@@ -95,7 +100,7 @@ class GlbWriter final : public TexturedMeshWriter {
     gltf["samplers"] = {
         {{"magFilter", kLinear}, {"minFilter", kLinearMipmapLinear}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}}};
     gltf["scenes"][0]["nodes"] = {0};
-    gltf["nodes"] = {{{"mesh", 0}, {"rotation", glb::YUpRotation()}}};
+    gltf["nodes"] = {glb::MeshNode(offset_)};
     gltf["meshes"] = {{{"primitives", std::move(primitives)}}};
     gltf["extensionsUsed"] = {"KHR_materials_unlit"};
     gltf["buffers"] = {{{"byteLength", description.buffer_bytes}}};
@@ -126,6 +131,7 @@ class GlbWriter final : public TexturedMeshWriter {
 
   const std::string path_;
   const std::vector<TexturePart> parts_;
+  const Eigen::Vector3d offset_;
   const TexturePictures pictures_;
   AtomicFile file_;
   size_t json_bytes_ = 0;
@@ -148,13 +154,13 @@ class ObjWriter final : public TexturedMeshWriter {
         pictures_(pictures),
         file_(std::move(file)) {}
 
-  absl::Status Begin(const std::vector<TexturePart>& parts) {
+  absl::Status Begin(const std::vector<TexturePart>& parts, const Eigen::Vector3d& offset) {
     MW_RETURN_IF_ERROR(file_.Append(absl::StrCat("# Meshwright\nmtllib ", name_, ".mtl\n")));
     uint64_t first = 1;  // numbers count on from part to part
     for (size_t i = 0; i < parts.size(); ++i) {
       const TexturePart& part = parts[i];
       const auto append_position = [&](size_t v, std::string& text) {
-        obj::AppendNumbers("v", part.positions[v], text);
+        obj::AppendPosition(part.positions[v], offset, text);
         text += '\n';
       };
       const auto append_coordinates = [&](size_t v, std::string& text) {
@@ -205,15 +211,16 @@ class ObjWriter final : public TexturedMeshWriter {
 absl::StatusOr<std::unique_ptr<TexturedMeshWriter>> TexturedMeshWriter::Create(const MeshFormat& format,
                                                                                const std::string& path,
                                                                                std::vector<TexturePart> parts,
+                                                                               const Eigen::Vector3d& offset,
                                                                                const TexturePictures& pictures) {
   MW_CHECK(format.textured);
   MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
   if (std::string(format.name) == "obj") {
     auto writer = std::make_unique<ObjWriter>(path, pictures, std::move(file));
-    MW_RETURN_IF_ERROR(writer->Begin(parts));
+    MW_RETURN_IF_ERROR(writer->Begin(parts, offset));
     return writer;
   }
-  auto writer = std::make_unique<GlbWriter>(path, std::move(parts), pictures, std::move(file));
+  auto writer = std::make_unique<GlbWriter>(path, std::move(parts), offset, pictures, std::move(file));
   MW_RETURN_IF_ERROR(writer->Begin());
   return writer;
 }

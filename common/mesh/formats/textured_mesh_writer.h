@@ -17,7 +17,7 @@ namespace meshwright {
 
 // The faces that one page of a texture atlas colours.
 struct TexturePart {
-  std::vector<Eigen::Vector3f> positions;            // scene units, world frame
+  std::vector<Eigen::Vector3f> positions;            // scene units, world frame less the offset
   std::vector<Eigen::Vector2f> texture_coordinates;  // glTF's: (0, 0) is the page's top-left corner, (1, 1) the other
   std::vector<std::array<uint32_t, 3>> faces;        // counter-clockwise seen from outside
 };
@@ -30,9 +30,11 @@ struct TexturePictures {
 // Writes a textured mesh page by page: GLB with its pictures inside, or OBJ with NAME.mtl and NAME_0.jpg ... beside it.
 class TexturedMeshWriter {
  public:
-  // `format.textured` must be set. Errors of AtomicFile; OutOfRange beyond the 4 GiB of GLB.
+  // `format.textured` must be set. `offset`: world = position + offset. Errors of AtomicFile; OutOfRange beyond the 4
+  // GiB of GLB.
   static absl::StatusOr<std::unique_ptr<TexturedMeshWriter>> Create(const MeshFormat& format, const std::string& path,
                                                                     std::vector<TexturePart> parts,
+                                                                    const Eigen::Vector3d& offset,
                                                                     const TexturePictures& pictures);
   virtual ~TexturedMeshWriter() = default;
 

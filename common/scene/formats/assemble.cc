@@ -17,6 +17,7 @@
 #include "common/base/status_macros.h"
 #include "common/base/utf8.h"
 #include "common/image/decode.h"
+#include "common/scene/formats/world_offset.h"
 #include "common/scene/undistorted_pinhole.h"
 
 namespace meshwright {
@@ -274,6 +275,7 @@ absl::StatusOr<Scene> AssembleScene(ImportedScene imported, const ImportOptions&
     new_index[old_index] = static_cast<CameraIndex>(scene.views.size());
     scene.views.push_back(std::move(views[old_index].view));
   }
+  MoveNearZero(&scene);
   OrderPoints(new_index, &scene.points);
   return scene;
 }

@@ -26,6 +26,10 @@ constexpr ColmapModelType kTypes[] = {
     {8, "SIMPLE_RADIAL_FISHEYE", Lens::Model::kRadialFisheye, 4, true},
     {9, "RADIAL_FISHEYE", Lens::Model::kRadialFisheye, 5, true},
     {10, "THIN_PRISM_FISHEYE", Lens::Model::kThinPrismFisheye, 12, false},
+    {11, "RAD_TAN_THIN_PRISM_FISHEYE", Lens::Model::kRadTanThinPrismFisheye, 16, false},
+    {12, "SIMPLE_DIVISION", Lens::Model::kDivision, 4, true},
+    {13, "DIVISION", Lens::Model::kDivision, 5, false},
+    {16, "EUCM", Lens::Model::kEucm, 6, false},
     // The angle itself: OPENCV_FISHEYE with all coefficients 0.
     {14, "SIMPLE_FISHEYE", Lens::Model::kOpenCvFisheye, 3, true},
     {15, "FISHEYE", Lens::Model::kOpenCvFisheye, 4, false},

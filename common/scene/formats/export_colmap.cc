@@ -47,6 +47,14 @@ ModelName NameOf(const Lens& lens) {
       return {"FOV", false, 1};
     case Lens::Model::kThinPrismFisheye:
       return {"THIN_PRISM_FISHEYE", false, 8};
+    case Lens::Model::kBrown:  // with a factor of r^8; without one it is FULL_OPENCV
+      return {nullptr, false, 0};
+    case Lens::Model::kRadTanThinPrismFisheye:
+      return {"RAD_TAN_THIN_PRISM_FISHEYE", false, 12};
+    case Lens::Model::kDivision:
+      return {"DIVISION", false, 1};
+    case Lens::Model::kEucm:
+      return {"EUCM", false, 2};
   }
   return {"PINHOLE", false, 0};
 }
@@ -68,12 +76,14 @@ struct Observation {
   size_t point;
 };
 
-std::string ImageText(const SceneView& view, size_t image_id, size_t camera_id,
+std::string ImageText(const SceneView& view, const Eigen::Vector3d& offset, size_t image_id, size_t camera_id,
                       const std::vector<Observation>& observations) {
   std::string text = absl::StrCat(image_id);
   const Eigen::Quaterniond q(view.cam_from_world.rotation);
   for (const double component : {q.w(), q.x(), q.y(), q.z()}) AppendNumber(component, &text);
-  for (const double component : view.cam_from_world.translation) AppendNumber(component, &text);
+  for (const double component : (view.cam_from_world.translation - view.cam_from_world.rotation * offset).eval()) {
+    AppendNumber(component, &text);
+  }
   absl::StrAppend(&text, " ", camera_id, " ", view.name, "\n");
   std::string points;
   for (const Observation& observation : observations) {
@@ -98,6 +108,10 @@ absl::Status ExportColmapText(const Scene& scene, const std::string& folder) {
       return absl::InvalidArgumentError(
           absl::StrCat(view.name, ": skew is ", view.lens.skew, " px; expected 0, COLMAP has no model with skew"));
     }
+    if (NameOf(view.lens).name == nullptr) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(view.name, ": its lens has a factor of r^8; expected none, COLMAP has no model with one"));
+    }
     if (view.name.empty() || view.name.find_first_of("\r\n") != std::string::npos) {
       return absl::InvalidArgumentError(absl::StrCat("image name is ", Quoted(view.name), "; expected one line"));
     }
@@ -113,7 +127,7 @@ absl::Status ExportColmapText(const Scene& scene, const std::string& folder) {
   for (size_t i = 0; i < scene.points.size(); ++i) {
     const SparsePoint& point = scene.points[i];
     absl::StrAppend(&points_text, i + 1);
-    for (const double component : point.x_in_world) AppendNumber(component, &points_text);
+    for (const double component : (point.x_in_world + scene.offset).eval()) AppendNumber(component, &points_text);
     for (const uint8_t sample : point.rgb) absl::StrAppend(&points_text, " ", sample);
     absl::StrAppend(&points_text, " 0");
     for (const CameraIndex camera : point.seen_by) {
@@ -131,7 +145,7 @@ absl::Status ExportColmapText(const Scene& scene, const std::string& folder) {
   std::string images_text =
       "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME; then POINTS2D[] as (X, Y, POINT3D_ID)\n";
   for (size_t i = 0; i < scene.views.size(); ++i) {
-    images_text += ImageText(scene.views[i], i + 1, camera_of_view[i] + 1, observations[i]);
+    images_text += ImageText(scene.views[i], scene.offset, i + 1, camera_of_view[i] + 1, observations[i]);
   }
   MW_RETURN_IF_ERROR(WriteFileAtomically(JoinPath(folder, "cameras.txt"), cameras_text));
   MW_RETURN_IF_ERROR(WriteFileAtomically(JoinPath(folder, "images.txt"), images_text));

@@ -51,7 +51,7 @@ void ExpectSmallPoses(const Scene& scene) {
 void ExpectSmallColmapRest(const Scene& scene) {
   const Lens& lens = scene.views[0].lens;
   EXPECT_EQ(lens.model, Lens::Model::kOpenCv);
-  EXPECT_THAT(lens.coefficients, ElementsAre(0.01, -0.02, 0.001, 0, 0, 0, 0, 0));
+  EXPECT_THAT(lens.coefficients, ElementsAre(0.01, -0.02, 0.001, 0, 0, 0, 0, 0, 0, 0, 0, 0));
   EXPECT_EQ(lens.cy, 5.25);
   ASSERT_EQ(scene.points.size(), 4);
   EXPECT_THAT(scene.points[0].seen_by, ElementsAre(0, 1));
@@ -202,7 +202,12 @@ TEST(ImportScene, EveryColmapModel) {
       {"FOV 12 10 20 21 6 5 0.9", Lens::Model::kFov},
       {"SIMPLE_RADIAL_FISHEYE 12 10 20 6 5 0.1", Lens::Model::kRadialFisheye},
       {"RADIAL_FISHEYE 12 10 20 6 5 0.1 0.2", Lens::Model::kRadialFisheye},
-      {"THIN_PRISM_FISHEYE 12 10 20 21 6 5 0.1 0.2 0.01 0.02 0.03 0.04 0.05 0.06", Lens::Model::kThinPrismFisheye}};
+      {"THIN_PRISM_FISHEYE 12 10 20 21 6 5 0.1 0.2 0.01 0.02 0.03 0.04 0.05 0.06", Lens::Model::kThinPrismFisheye},
+      {"RAD_TAN_THIN_PRISM_FISHEYE 12 10 20 21 6 5 0.1 0.2 0.01 0 0 0 0.001 0.001 0.001 0.001 0.001 0.001",
+       Lens::Model::kRadTanThinPrismFisheye},
+      {"SIMPLE_DIVISION 12 10 20 6 5 0.1", Lens::Model::kDivision},
+      {"DIVISION 12 10 20 21 6 5 0.1", Lens::Model::kDivision},
+      {"EUCM 12 10 20 21 6 5 0.1 1.1", Lens::Model::kEucm}};
   for (const auto& [line, model] : models) {
     SceneFiles files = SmallColmapText();
     files["cameras.txt"] = "3 PINHOLE 12 10 20 21 6 5\n7 " + std::string(line) + "\n";
@@ -212,7 +217,7 @@ TEST(ImportScene, EveryColmapModel) {
     if (model == Lens::Model::kFov) {
       EXPECT_EQ(lens.coefficients[0], 0.9);
     } else if (model == Lens::Model::kFullOpenCv || model == Lens::Model::kThinPrismFisheye) {
-      EXPECT_THAT(lens.coefficients, ElementsAre(0.1, 0.2, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06));
+      EXPECT_THAT(lens.coefficients, ElementsAre(0.1, 0.2, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0, 0, 0, 0));
     } else if (model != Lens::Model::kPinhole) {
       EXPECT_EQ(lens.coefficients[0], 0.1);
     }
@@ -230,9 +235,8 @@ TEST(ImportScene, ErrorsNameFileLineFieldValueAndExpectation) {
   };
   EXPECT_THAT(text("cameras.txt", "20 21 6", "nan 21 6"),
               HasSubstr("cameras.txt, line 2: PARAMS is \"nan\"; expected a finite number"));
-  EXPECT_THAT(
-      text("cameras.txt", "OPENCV", "RAD_TAN_THIN_PRISM_FISHEYE"),
-      HasSubstr("cameras.txt, line 3: MODEL is \"RAD_TAN_THIN_PRISM_FISHEYE\"; expected one of SIMPLE_PINHOLE"));
+  EXPECT_THAT(text("cameras.txt", "OPENCV", "EQUIRECTANGULAR"),
+              HasSubstr("cameras.txt, line 3: MODEL is \"EQUIRECTANGULAR\"; expected one of SIMPLE_PINHOLE"));
   EXPECT_THAT(text("cameras.txt", "12 10", "-12 10"), HasSubstr("line 2: WIDTH is \"-12\"; expected an integer"));
   EXPECT_THAT(text("cameras.txt", "12 10", "900000 900000"), HasSubstr("line 2: image size is 900000 x 900000"));
   EXPECT_THAT(text("cameras.txt", "20 21", "0 21"), HasSubstr("line 2: focal length is 0, 21 px; expected"));
@@ -327,9 +331,9 @@ TEST(ImportScene, CountsThatLieAllocateNothing) {
   points.replace(8 + 43, 8, std::string("\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF", 8));  // track length of the first point
   EXPECT_THAT(InvalidMessage(files), HasSubstr("points3D.bin, record 1: track length is 18446744073709551615"));
   files = SmallColmapBinary();
-  files["sparse/0/cameras.bin"][12] = 11;
+  files["sparse/0/cameras.bin"][12] = 17;
   EXPECT_THAT(InvalidMessage(files),
-              HasSubstr("cameras.bin, record 1: camera model is number 11; expected one of those known"));
+              HasSubstr("cameras.bin, record 1: camera model is number 17; expected one of those known"));
   files = SmallColmapBinary();
   files["sparse/0/images.bin"] += 'x';
   EXPECT_THAT(InvalidMessage(files), HasSubstr("images.bin, record 3: 1 bytes follow the last record"));

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "common/scene/scene.h"
+
+namespace meshwright {
+
+// Chooses scene->offset and moves poses and points by it, where coordinates are so far from zero that floats, which
+// surfaces and meshes have, would lose what photographs show: further than ten times the cameras' extent and than 10^4
+// times the median distance of a camera to the next one. It is the cameras' centroid rounded to 100 units (to fewer
+// where cameras are closer than a unit), so that it can be written in few digits.
+void MoveNearZero(Scene* scene);
+
+}  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0
