@@ -29,6 +29,18 @@ void AddSceneOptions(CLI::App& command, SceneArguments& scene) {
       ->check(CLI::NonNegativeNumber);
   command.add_option("--images", scene.import.images_folder, "where the photographs are, if not in the scene's folder")
       ->type_name("FOLDER");
+  command.add_flag("--rescale-cameras", scene.import.rescale_cameras,
+                   "cameras follow photographs that are larger or smaller than they say, by a common factor");
+  command
+      .add_option_function<std::vector<double>>(
+          "--intrinsics",
+          [&scene](const std::vector<double>& k) {
+            scene.import.intrinsics = {k[0], k[1], k[2], k[3]};
+          },
+          "of all photographs, px; for formats that have poses alone")
+      ->delimiter(',')
+      ->expected(4)
+      ->type_name("FX,FY,CX,CY");
 }
 
 void AddOutputOptions(CLI::App& command, OutputSettings& output) {

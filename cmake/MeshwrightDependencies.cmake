@@ -15,6 +15,7 @@ find_package(CURL REQUIRED)
 find_package(Boost 1.81 REQUIRED)  # Asio and Beast: headers alone
 find_package(meshoptimizer REQUIRED)
 find_package(nlohmann_json REQUIRED)
+find_package(EXPAT REQUIRED)
 find_package(CLI11 REQUIRED)
 if(BUILD_TESTING)
   find_package(GTest REQUIRED)

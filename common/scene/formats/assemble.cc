@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <numeric>
 #include <tuple>
@@ -37,19 +38,46 @@ absl::Status CheckImageName(const std::string& name, const Place& place) {
   return absl::OkStatus();
 }
 
+// Whether the picture is the camera's, made larger or smaller: the sides have one ratio, but for their rounding.
+bool HasOneFactor(const ImageSize& size, const Lens& lens) {
+  const double factor = static_cast<double>(size.width) / lens.width;
+  return std::abs(factor * lens.height - size.height) <= std::max(1.0, factor);
+}
+
+void Rescale(const ImageSize& size, Lens* lens) {
+  const double x = static_cast<double>(size.width) / lens->width;
+  const double y = static_cast<double>(size.height) / lens->height;
+  lens->width = size.width;
+  lens->height = size.height;
+  lens->fx *= x;
+  lens->skew *= x;
+  lens->cx *= x;
+  lens->fy *= y;
+  lens->cy *= y;
+}
+
 // Reads no more of the view's picture than the header.
-absl::Status CheckImageSize(ImportedView* imported) {
+absl::Status CheckImageSize(const ImportOptions& options, ImportedView* imported) {
   SceneView& view = imported->view;
   MW_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(view.image_path));
   if (view.lens.width == 0) {
+    if (imported->lens_of_size != nullptr) {
+      MW_ASSIGN_OR_RETURN(view.lens, imported->lens_of_size(size.width, size.height));
+    }
     view.lens.width = size.width;
     view.lens.height = size.height;
     return CheckLens(view.lens, imported->named_at);
   }
   if (size.width != view.lens.width || size.height != view.lens.height) {
+    const bool one_factor = HasOneFactor(size, view.lens);
+    if (one_factor && options.rescale_cameras) {
+      Rescale(size, &view.lens);
+      return CheckLens(view.lens, imported->named_at);
+    }
     return absl::InvalidArgumentError(
         absl::StrCat(view.image_path, ": the picture has ", SizeText(size.width, size.height), " px; its camera (",
-                     imported->named_at.ToString(), ") expects ", SizeText(view.lens.width, view.lens.height)));
+                     imported->named_at.ToString(), ") expects ", SizeText(view.lens.width, view.lens.height),
+                     one_factor ? "; --rescale-cameras makes cameras follow" : ""));
   }
   return absl::OkStatus();
 }
@@ -271,13 +299,48 @@ absl::StatusOr<Scene> AssembleScene(ImportedScene imported, const ImportOptions&
   std::vector<CameraIndex> new_index(views.size(), kDropped);
   for (const size_t old_index : order) {
     if (views[old_index].view.image_path.empty()) continue;
-    MW_RETURN_IF_ERROR(CheckImageSize(&views[old_index]));
+    MW_RETURN_IF_ERROR(CheckImageSize(options, &views[old_index]));
     new_index[old_index] = static_cast<CameraIndex>(scene.views.size());
     scene.views.push_back(std::move(views[old_index].view));
   }
   MoveNearZero(&scene);
   OrderPoints(new_index, &scene.points);
   return scene;
+}
+
+absl::StatusOr<size_t> ChooseLargest(const std::string& file, const std::vector<size_t>& photographs,
+                                     const ImportOptions& options, std::vector<std::string>* warnings) {
+  auto chosen = static_cast<size_t>(std::max_element(photographs.begin(), photographs.end()) - photographs.begin());
+  if (options.model.has_value()) chosen = static_cast<size_t>(*options.model);
+  if (chosen >= photographs.size()) {
+    return absl::NotFoundError(
+        absl::StrCat(file, ": model is ", chosen, "; expected one from 0 to ", photographs.size() - 1));
+  }
+  for (size_t i = 0; i < photographs.size(); ++i) {
+    if (i == chosen) continue;
+    warnings->push_back(absl::StrCat("model ", i, " of ", file, " (", photographs[i],
+                                     " photographs) is another reconstruction and is not used; --model ", i,
+                                     " takes it"));
+  }
+  return chosen;
+}
+
+std::string LowerCaseEnding(const std::string& name) {
+  return LowerCase(std::filesystem::path(name).extension().string());
+}
+
+std::string ReadHead(const std::string& path, size_t size) {
+  std::string head(size, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(size));
+  head.resize(static_cast<size_t>(std::max<std::streamsize>(file.gcount(), 0)));
+  return head;
+}
+
+std::string NameOfFolder(const std::string& folder) {
+  std::error_code ignored;
+  const std::filesystem::path path = std::filesystem::absolute(folder, ignored).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
 bool IsFile(const std::string& path) {
@@ -307,6 +370,11 @@ std::vector<std::string> FilesEndingIn(const std::string& folder, const std::str
   }
   std::sort(names.begin(), names.end());
   return names;
+}
+
+std::string FirstFileEndingIn(const std::string& folder, const std::string& suffix) {
+  const std::vector<std::string> names = FilesEndingIn(folder, suffix);
+  return names.empty() ? "" : JoinPath(folder, names.front());
 }
 
 }  // namespace meshwright

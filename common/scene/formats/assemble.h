@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,9 @@ absl::StatusOr<Eigen::Matrix3d> RotationFromQuaternion(double w, double x, doubl
 struct ImportedView {
   SceneView view;  // image_path is empty yet; the lens is checked, or its width is 0: the file does not tell the size
   Place named_at;
+  // Where the width is 0: the lens at the size in px that the picture turns out to have. Without it the lens is as it
+  // is but for the size.
+  std::function<absl::StatusOr<Lens>(int width, int height)> lens_of_size = nullptr;
 };
 
 // What an importer has read.
@@ -47,11 +51,24 @@ absl::StatusOr<Scene> AssembleScene(ImportedScene imported, const ImportOptions&
 // folder is cut to its last part.
 std::string PortableImageName(const std::string& path);
 
+// Which of several reconstructions in one file is taken, with `photographs` each: the largest, or options.model. Warns
+// of the others. NotFound: there is no such model.
+absl::StatusOr<size_t> ChooseLargest(const std::string& file, const std::vector<size_t>& photographs,
+                                     const ImportOptions& options, std::vector<std::string>* warnings);
+
+// ".jpg", also of "A.JPG".
+std::string LowerCaseEnding(const std::string& name);
+// The first bytes of a file, as many as there are up to `size`; empty when it cannot be read.
+std::string ReadHead(const std::string& path, size_t size);
+// The last part of a folder's full path, also for "." and "x/".
+std::string NameOfFolder(const std::string& folder);
 bool IsFile(const std::string& path);
 bool IsFolder(const std::string& path);
 std::string JoinPath(const std::string& folder, const std::string& name);
 // Names of the files in a folder that end in `suffix`, sorted. Empty when there is no such folder.
 std::vector<std::string> FilesEndingIn(const std::string& folder, const std::string& suffix);
+// The path of the first of them; empty when there is none.
+std::string FirstFileEndingIn(const std::string& folder, const std::string& suffix);
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

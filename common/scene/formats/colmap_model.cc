@@ -47,13 +47,6 @@ bool IsNumber(const std::string& name) {
   return !name.empty() && name.size() <= kMostDigits && name.find_first_not_of("0123456789") == std::string::npos;
 }
 
-// The last part of the folder's full path, also for "." and "x/".
-std::string NameOf(const std::string& folder) {
-  std::error_code ignored;
-  const std::filesystem::path path = std::filesystem::absolute(folder, ignored).lexically_normal();
-  return (path.has_filename() ? path : path.parent_path()).filename().string();
-}
-
 // Sorted.
 std::vector<int> NumberedModels(const std::string& folder, const std::string& extension) {
   std::vector<int> numbers;
@@ -219,12 +212,12 @@ absl::StatusOr<std::string> ChooseColmapModel(const std::string& folder, const s
 std::vector<std::string> ColmapImageFolders(const std::string& model_folder) {
   std::vector<std::string> folders;
   std::string folder = JoinPath(model_folder, "");
-  for (std::string name = NameOf(folder);; name = NameOf(folder)) {
+  for (std::string name = NameOfFolder(folder);; name = NameOfFolder(folder)) {
     folders.push_back(JoinPath(folder, "images"));
     folders.push_back(folder);
     const std::string above = JoinPath(folder, "../");
     const bool holds_models = name == "sparse" || name == "colmap" || name == "model";
-    const bool is_numbered = IsNumber(name) && NameOf(above) == "sparse";
+    const bool is_numbered = IsNumber(name) && NameOfFolder(above) == "sparse";
     if (!holds_models && !is_numbered) return folders;
     folder = above;
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 
@@ -10,6 +11,8 @@ struct ImportOptions {
   std::optional<std::string> format;  // a name of SceneFormats()
   std::optional<int> model;           // which of several reconstructions in the scene; without it the largest
   std::string images_folder;          // where the photographs are; empty: the places that are usual for the format
+  std::optional<std::array<double, 4>> intrinsics;  // fx fy cx cy in px, of all photographs; for formats without
+  bool rescale_cameras = false;  // cameras follow photographs that are larger or smaller by a common factor
 };
 
 }  // namespace meshwright

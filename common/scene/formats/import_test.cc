@@ -348,9 +348,9 @@ TEST(ImportScene, SaysWhatItLookedFor) {
   status = ImportScene(folder, {.format = "middlebury"}).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(std::string(status.message()), HasSubstr("no middlebury scene; expected *_par.txt"));
-  status = ImportScene(folder, {.format = "bundler"}).status();
+  status = ImportScene(folder, {.format = "polycam"}).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(std::string(status.message()), HasSubstr("format is \"bundler\"; expected one of colmap-binary"));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("format is \"polycam\"; expected one of colmap-binary"));
   EXPECT_EQ(ImportScene(folder + "/none").status().code(), absl::StatusCode::kNotFound);
   WriteScene(folder, {{"file", "x"}});
   EXPECT_EQ(ImportScene(folder + "/file").status().code(), absl::StatusCode::kInvalidArgument);

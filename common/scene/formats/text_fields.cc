@@ -85,11 +85,19 @@ absl::StatusOr<std::string_view> TextFields::Word(const char* field) {
 }
 
 absl::StatusOr<double> TextFields::Number(const char* field) {
+  TextFields before = *this;
+  MW_ASSIGN_OR_RETURN(const double value, NumberOrNone(field));
+  if (std::isfinite(value)) return value;
+  MW_ASSIGN_OR_RETURN(const std::string_view word, before.Word(field));
+  return FieldError(place_, field, Quoted(word), "a finite number");
+}
+
+absl::StatusOr<double> TextFields::NumberOrNone(const char* field) {
   MW_ASSIGN_OR_RETURN(const std::string_view word, Word(field));
   const std::string_view digits = word.front() == '+' ? word.substr(1) : word;
   double value = std::numeric_limits<double>::quiet_NaN();
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(value)) {
+  if (error != std::errc() || end != digits.data() + digits.size()) {
     return FieldError(place_, field, Quoted(word), "a finite number");
   }
   return value;

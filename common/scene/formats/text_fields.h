@@ -54,6 +54,8 @@ class TextFields {
   absl::StatusOr<std::string_view> Word(const char* field);
   // A finite number.
   absl::StatusOr<double> Number(const char* field);
+  // The same, or "nan" and "inf", by which some files say that there is none.
+  absl::StatusOr<double> NumberOrNone(const char* field);
   absl::StatusOr<int64_t> Integer(const char* field, int64_t smallest, int64_t largest);
   // What is left, without white space around it; not empty.
   absl::StatusOr<std::string_view> Rest(const char* field);

@@ -1,22 +1,25 @@
 #include <functional>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "common/scene/formats/import.h"
 #include "common/scene/formats/small_scenes.h"
 #include "common/scene/view.h"
+#include "tests/scene_formats/scene_writers.h"
 
 namespace meshwright {
 namespace {
 
 // Whatever happens to its files, a scene is either read or refused in one line that names a file.
-class FaultInjection : public testing::TestWithParam<SceneFiles (*)()> {
+class FaultInjection : public testing::TestWithParam<std::function<SceneFiles()>> {
  protected:
   void ForEachFile(const std::function<void(const std::string& file, const std::string& bytes)>& body) {
     const SceneFiles files = GetParam()();
     folder_ = FreshFolder("fault");
     WriteScene(folder_, files);
-    ASSERT_TRUE(ImportScene(folder_).ok());
+    ASSERT_TRUE(ImportScene(folder_, options_).ok());
     for (const auto& [file, bytes] : files) {
       if (file.ends_with(".png")) continue;
       body(file, bytes);
@@ -27,7 +30,7 @@ class FaultInjection : public testing::TestWithParam<SceneFiles (*)()> {
   // Returns whether the scene could be read.
   bool ImportDamaged(const std::string& file, const std::string& bytes) {
     WriteScene(folder_, {{file, bytes}});
-    const absl::StatusOr<Scene> scene = ImportScene(folder_);
+    const absl::StatusOr<Scene> scene = ImportScene(folder_, options_);
     if (scene.ok()) {
       for (const SceneView& view : scene->views) EXPECT_TRUE(view.cam_from_world.translation.allFinite());
       EXPECT_TRUE(LoadView(scene->views.front(), 8).ok());
@@ -41,6 +44,7 @@ class FaultInjection : public testing::TestWithParam<SceneFiles (*)()> {
   }
 
   std::string folder_;
+  const ImportOptions options_ = {.intrinsics = {{20, 20, 6, 5}}};  // for formats that have none
 };
 
 TEST_P(FaultInjection, Truncation) {
@@ -92,8 +96,13 @@ TEST_P(FaultInjection, Noise) {
   });
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, FaultInjection,
-                         testing::Values(SmallColmapText, SmallColmapBinary, SmallMiddlebury, SmallStrecha));
+std::vector<std::function<SceneFiles()>> SmallScenes() {
+  std::vector<std::function<SceneFiles()>> scenes = {SmallColmapText, SmallColmapBinary, SmallMiddlebury, SmallStrecha};
+  for (const SceneWriter& writer : SceneWriters()) scenes.push_back([&writer] { return SmallSceneAs(writer); });
+  return scenes;
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, FaultInjection, testing::ValuesIn(SmallScenes()));
 
 }  // namespace
 }  // namespace meshwright

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/scene/formats/small_scenes.h"
+#include "common/scene/scene.h"
+
+// Scenes in the formats that other programs write, for the tests of their importers: made from the formats'
+// definitions, not from the importers.
+namespace meshwright {
+
+// What a format can say of a lens; the rest has to be the least of it.
+struct LensLimits {
+  bool two_focals = true;
+  bool free_center = true;  // of the principal point
+  int radial = 0;           // coefficients
+  bool tangential = false;
+};
+
+struct SceneWriter {
+  const char* format;  // of SceneFormats()
+  const char* variant;
+  SceneFiles (*write)(const Scene& scene);  // all but the pictures, which are in images/
+  LensLimits limits;
+  bool has_points = true;  // with the cameras that see them
+  bool has_intrinsics = true;
+  double point_digits = 1e-9;  // of coordinates, relative
+};
+const std::vector<SceneWriter>& SceneWriters();
+
+// Three cameras, a.png, b.png and c.png of kSmallWidth x kSmallHeight px, and points that they see.
+Scene SmallSceneWithin(const LensLimits& limits);
+
+// A small scene in the format, with its pictures.
+SceneFiles SmallSceneAs(const SceneWriter& writer);
+
+}  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0
