@@ -29,6 +29,16 @@ void AddSceneOptions(CLI::App& command, SceneArguments& scene) {
       ->check(CLI::NonNegativeNumber);
   command.add_option("--images", scene.import.images_folder, "where the photographs are, if not in the scene's folder")
       ->type_name("FOLDER");
+  command
+      .add_option("--masks", scene.import.masks_folder,
+                  "where masks of photographs are, black where nothing is to be looked at; without it masks/ beside "
+                  "images/, and NAME_mask.png")
+      ->type_name("FOLDER");
+  command
+      .add_option("--region", scene.import.region,
+                  "a box (JSON) outside of which nothing is reconstructed; \"auto\": around the sparse points; "
+                  "\"none\"; without it region.json of the scene")
+      ->type_name("FILE|auto|none");
   command.add_flag("--rescale-cameras", scene.import.rescale_cameras,
                    "cameras follow photographs that are larger or smaller than they say, by a common factor");
   command

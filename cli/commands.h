@@ -25,6 +25,7 @@ void AddToolCommands(CLI::App& program, Run& run);
 void AddEvaluateCommand(CLI::App& program, Run& run);
 void AddSynthesizeCommand(CLI::App& program, Run& run);
 void AddConvertCommand(CLI::App& program, Run& run);
+void AddCropCommand(CLI::App& program, Run& run);
 void AddRenderCommand(CLI::App& program, Run& run);
 void AddSubmitCommand(CLI::App& program, Run& run);
 void AddOptionsCommand(CLI::App& program, Run& run);
@@ -40,7 +41,7 @@ struct SceneArguments {
   std::string path;
   ImportOptions import;
 };
-// --format, --model and --images.
+// --format, --model, --images, --masks, --region and what else says how a scene is read.
 void AddSceneOptions(CLI::App& command, SceneArguments& scene);
 void AddOutputOptions(CLI::App& command, OutputSettings& output);
 // --texture-error and what else an atlas depends on.

@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
   AddCamerasCommand(program, run);
   AddInspectCommand(program, run);
   AddConvertCommand(program, run);
+  AddCropCommand(program, run);
   AddTextureCommand(program, run);
   AddToolCommands(program, run);
   AddOptionsCommand(program, run);

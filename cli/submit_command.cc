@@ -36,6 +36,8 @@ constexpr char kExamples[] = R"(Examples:
   meshwright submit file:campaign/7 --wait          # a folder below the coordinator's --scene-root)";
 
 constexpr char kByReference[] = "file:";
+constexpr char kRegionFile[] = "region.json";  // which a scene's region is taken from
+constexpr char kNoRegion[] = "none";
 
 struct Arguments {
   ServiceArguments service;
@@ -89,7 +91,12 @@ absl::StatusOr<std::vector<std::string>> FilesOf(const std::string& folder) {
 
 absl::Status Upload(const Arguments& arguments, const std::vector<std::string>& files, ServiceClient& client) {
   int sent = 0;
+  const std::string& region = arguments.scene.import.region;
+  if (!region.empty() && region != kNoRegion) {
+    MW_RETURN_IF_ERROR(client.Upload(arguments.id, kRegionFile, region));
+  }
   for (const std::string& file : files) {
+    if (file == kRegionFile && !region.empty()) continue;
     MW_RETURN_IF_ERROR(client.Upload(arguments.id, file, (fs::path(arguments.scene.path) / file).string()));
     if (!arguments.service.output.quiet && ++sent % 50 == 0) {
       std::fprintf(stderr, "%s: %d/%d files uploaded\n", arguments.id.c_str(), sent, static_cast<int>(files.size()));

@@ -1,6 +1,7 @@
 #include "common/image/sampling_image.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/check.h"
 
@@ -43,7 +44,7 @@ GreyImage Halve(const GreyImage& grey) {
 
 }  // namespace
 
-SamplingImage::SamplingImage(const GreyImage& grey, int levels) {
+SamplingImage::SamplingImage(const GreyImage& grey, int levels, IgnoredPixels ignored) : ignored_(std::move(ignored)) {
   MW_CHECK(levels >= 1);
   MW_CHECK(grey.width > 0 && grey.height > 0);
   levels_.push_back({grey.width, grey.height, PackQuads(grey)});
@@ -55,7 +56,7 @@ SamplingImage::SamplingImage(const GreyImage& grey, int levels) {
 }
 
 int64_t SamplingImage::bytes() const {
-  int64_t total = 0;
+  int64_t total = ignored_.bytes();
   for (const Level& level : levels_) total += static_cast<int64_t>(level.quads.size() * sizeof(uint32_t));
   return total;
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/image/color_image.h"
+#include "common/image/ignored_pixels.h"
 
 namespace meshwright {
 
@@ -18,8 +19,8 @@ class SamplingImage {
     std::vector<uint32_t> quads;  // width * height
   };
 
-  // `levels` >= 1; fewer are made when the image becomes smaller than 16 px.
-  SamplingImage(const GreyImage& grey, int levels);
+  // `levels` >= 1; fewer are made when the image becomes smaller than 16 px. `ignored`: of level 0.
+  SamplingImage(const GreyImage& grey, int levels, IgnoredPixels ignored = {});
 
   int width() const { return levels_[0].width; }
   int height() const { return levels_[0].height; }
@@ -30,10 +31,12 @@ class SamplingImage {
     return static_cast<uint8_t>(
         levels_[0].quads[static_cast<size_t>(y) * static_cast<size_t>(width()) + static_cast<size_t>(x)] & 0xFFU);
   }
+  const IgnoredPixels& ignored() const { return ignored_; }
   int64_t bytes() const;
 
  private:
   std::vector<Level> levels_;
+  IgnoredPixels ignored_;
 };
 
 }  // namespace meshwright

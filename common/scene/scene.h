@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 
 #include "common/base/ids.h"
 #include "common/geometry/lens.h"
+#include "common/geometry/oriented_box.h"
 #include "common/geometry/rigid3.h"
 
 namespace meshwright {
@@ -19,6 +21,7 @@ struct SceneView {
   std::string image_path;  // where the picture is
   Lens lens;               // intrinsics and distortion at the size of the picture
   Rigid3 cam_from_world;
+  std::string mask_path = {};  // of a picture that is black where this one is not to be used; "": it is used whole
 };
 
 // A point of the sparse reconstruction (structure from motion) with the cameras that saw it.
@@ -38,6 +41,8 @@ struct Scene {
   // from it (UTM, ECEF), as surfaces and most formats of meshes have floats. Outside of this struct everything is local
   // until a mesh is written.
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  // What is outside of it is not reconstructed. Local, as poses are.
+  std::optional<OrientedBox> region = std::nullopt;
   // What was left out or doubted when the scene was read, a line each; for people, no part of what the scene is.
   std::vector<std::string> warnings = {};
 };

@@ -12,6 +12,7 @@
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
 #include "common/image/decode.h"
+#include "common/scene/view.h"
 
 namespace meshwright {
 namespace {
@@ -23,7 +24,11 @@ absl::StatusOr<std::string> CheckPhotograph(const SceneView& view) {
     return absl::InvalidArgumentError(absl::StrCat(view.image_path, ": the picture is ", image.width, "x", image.height,
                                                    ", its camera expects ", view.lens.width, "x", view.lens.height));
   }
-  return Sha256Hex(bytes);
+  std::string digest = Sha256Hex(bytes);
+  if (view.mask_path.empty()) return digest;
+  MW_ASSIGN_OR_RETURN(const std::string mask, ReadFile(view.mask_path));
+  MW_RETURN_IF_ERROR(DecodeMask(view, mask).status());
+  return digest + Sha256Hex(mask);
 }
 
 // Bytes of values in one agreed form: little-endian machines only, as everywhere here.
@@ -82,6 +87,11 @@ absl::StatusOr<std::string> CheckAndDigestScene(const Scene& scene, ThreadPool& 
   // Left out where it is 0, so that work begun by versions that knew none goes on.
   if (!scene.offset.isZero(0)) {
     for (const double value : scene.offset) digest.Add(value);
+  }
+  if (scene.region.has_value()) {
+    for (const double value : scene.region->center) digest.Add(value);
+    for (const double value : scene.region->axes.reshaped()) digest.Add(value);
+    for (const double value : scene.region->size) digest.Add(value);
   }
   for (const SparsePoint& point : scene.points) {
     for (const double value : point.x_in_world) digest.Add(value);

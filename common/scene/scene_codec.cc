@@ -14,7 +14,7 @@ namespace meshwright {
 namespace {
 
 constexpr char kMagic[] = "MWSCENE2";        // the last digit is the version
-constexpr char kMagicBefore[] = "MWSCENE1";  // no offset, fewer coefficients
+constexpr char kMagicBefore[] = "MWSCENE1";  // no offset, masks or region, fewer coefficients
 constexpr size_t kMagicSize = 8;
 constexpr size_t kDigestSize = 64;
 constexpr int kLastModel = static_cast<int>(Lens::Model::kEucm);
@@ -33,6 +33,7 @@ void AppendDoubles(const Values& values, std::string& out) {
 void AppendView(const SceneView& view, std::string& out) {
   AppendText(view.name, out);
   AppendText(view.image_path, out);
+  AppendText(view.mask_path, out);
   const Lens& lens = view.lens;
   AppendLittleEndian(static_cast<int32_t>(lens.model), out);
   AppendLittleEndian(static_cast<int32_t>(lens.width), out);
@@ -89,6 +90,7 @@ class Reader {
 bool ReadView(Reader& reader, bool is_before, SceneView& view) {
   view.name = ToUtf8(reader.NextText());
   view.image_path = reader.NextText();
+  if (!is_before) view.mask_path = reader.NextText();
   Lens& lens = view.lens;
   const auto model = reader.Next<int32_t>();
   if (model < 0 || model > kLastModel) return false;
@@ -120,6 +122,12 @@ std::string EncodeScene(const Scene& scene) {
   std::string out(kMagic, kMagicSize);
   AppendText(scene.format, out);
   AppendDoubles(scene.offset, out);
+  AppendLittleEndian(static_cast<uint8_t>(scene.region.has_value() ? 1 : 0), out);
+  if (scene.region.has_value()) {
+    AppendDoubles(scene.region->center, out);
+    AppendDoubles(scene.region->axes.reshaped(), out);
+    AppendDoubles(scene.region->size, out);
+  }
   AppendLittleEndian(static_cast<uint32_t>(scene.views.size()), out);
   for (const SceneView& view : scene.views) AppendView(view, out);
   AppendLittleEndian(static_cast<uint32_t>(scene.points.size()), out);
@@ -146,7 +154,15 @@ absl::StatusOr<Scene> DecodeScene(const std::string& bytes) {
   Reader reader(body.data() + kMagicSize, body.data() + body.size());
   Scene scene;
   scene.format = reader.NextText();
-  if (!is_before) reader.NextDoubles(scene.offset);
+  if (!is_before) {
+    reader.NextDoubles(scene.offset);
+    if (reader.Next<uint8_t>() != 0) {
+      OrientedBox& region = scene.region.emplace();
+      reader.NextDoubles(region.center);
+      reader.NextDoubles(region.axes.reshaped());
+      reader.NextDoubles(region.size);
+    }
+  }
   scene.views.resize(reader.NextCount(1));
   for (SceneView& view : scene.views) {
     if (!ReadView(reader, is_before, view)) return malformed;

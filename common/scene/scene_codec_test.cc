@@ -24,6 +24,8 @@ Scene SmallScene() {
   scene.points.push_back({.x_in_world = {0.1, 0.2, 0.3}, .rgb = {1, 2, 255}, .seen_by = {0, 2}});
   scene.points.push_back({});
   scene.offset = {500000, 1.0 / 3, -4e6};
+  scene.region = {.center = {1, 2, 3}, .axes = Eigen::Matrix3d::Identity(), .size = {4, 5, 1.0 / 6}};
+  scene.views[1].mask_path = "mask";
   return scene;
 }
 
@@ -41,6 +43,8 @@ TEST(SceneCodecTest, EveryValueComesBack) {
   EXPECT_EQ(decoded->points[0].seen_by, scene.points[0].seen_by);
   EXPECT_EQ(decoded->points[0].x_in_world, scene.points[0].x_in_world);
   EXPECT_EQ(decoded->offset, scene.offset);
+  EXPECT_EQ(decoded->region->size, scene.region->size);
+  EXPECT_EQ(decoded->views[1].mask_path, "mask");
 }
 
 TEST(SceneCodecTest, TruncatedOrFlippedBytesAreRefused) {

@@ -55,11 +55,42 @@ Camera UndistortedCamera(const SceneView& view, int max_image_size) {
 }
 
 absl::StatusOr<View> LoadView(const SceneView& view, int max_image_size) {
-  MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(view.image_path));
-  return DecodeView(view, bytes, max_image_size);
+  MW_ASSIGN_OR_RETURN(const std::string picture, ReadFile(view.image_path));
+  std::string mask;
+  if (!view.mask_path.empty()) {
+    MW_ASSIGN_OR_RETURN(mask, ReadFile(view.mask_path));
+  }
+  return DecodeView(view, picture, mask, max_image_size);
 }
 
-absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& picture_bytes, int max_image_size) {
+absl::StatusOr<ColorImage> DecodeMask(const SceneView& view, const std::string& mask_bytes) {
+  MW_ASSIGN_OR_RETURN(ColorImage mask, DecodeImageBytes(mask_bytes, view.mask_path));
+  const int width = view.lens.width;
+  const int height = view.lens.height;
+  const double factor = static_cast<double>(mask.width) / width;
+  if (std::abs(factor * height - mask.height) > std::max(1.0, factor)) {
+    return absl::InvalidArgumentError(absl::StrCat(view.mask_path, ": the mask has ", mask.width, " x ", mask.height,
+                                                   " px; expected its picture's ", width, " x ", height,
+                                                   ", or one factor of it"));
+  }
+  // JPEG leaves grey around edges.
+  constexpr int kLeastWhiteOfJpeg = 128;
+  const bool is_jpeg = mask_bytes.size() > 2 && mask_bytes.compare(0, 2, "\xFF\xD8") == 0;
+  mask = BlackAndWhite(std::move(mask), is_jpeg ? kLeastWhiteOfJpeg : 1);
+  if (mask.width == width && mask.height == height) return mask;
+  ColorImage scaled{.width = width, .height = height, .rgb = {}};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto sample = mask.At(static_cast<int>(int64_t{x} * mask.width / width),
+                                  static_cast<int>(int64_t{y} * mask.height / height));
+      scaled.rgb.insert(scaled.rgb.end(), sample.begin(), sample.end());
+    }
+  }
+  return scaled;
+}
+
+absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& picture_bytes, const std::string& mask_bytes,
+                                int max_image_size) {
   MW_ASSIGN_OR_RETURN(ColorImage image, DecodeImageBytes(picture_bytes, view.image_path));
   if (image.width != view.lens.width || image.height != view.lens.height) {
     return absl::InvalidArgumentError(absl::StrCat(view.image_path, ": the picture has ", image.width, " x ",
@@ -71,9 +102,18 @@ absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& pictur
     return absl::InvalidArgumentError(
         absl::StrCat(view.image_path, ": its camera's distortion leaves no rectangle to undistort to"));
   }
-  if (!view.lens.is_plain_pinhole()) image = Undistort(image, view.lens, pinhole);
   const Camera camera = UndistortedCamera(view, max_image_size);
-  return View{.camera = camera, .color = ReduceByArea(image, camera.width, camera.height)};
+  const auto prepare = [&](ColorImage source) {
+    if (!view.lens.is_plain_pinhole()) source = Undistort(source, view.lens, pinhole);
+    return ReduceByArea(source, camera.width, camera.height);
+  };
+  View prepared{.camera = camera, .color = prepare(std::move(image)), .ignored = {}};
+  if (!view.mask_path.empty()) {
+    // A pixel that has anything of a black one is not white any more: nothing that the mask hides is left.
+    MW_ASSIGN_OR_RETURN(ColorImage mask, DecodeMask(view, mask_bytes));
+    prepared.ignored = IgnoredPixels(prepare(std::move(mask)));
+  }
+  return prepared;
 }
 
 }  // namespace meshwright

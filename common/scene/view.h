@@ -7,6 +7,7 @@
 
 #include "common/geometry/camera.h"
 #include "common/image/color_image.h"
+#include "common/image/ignored_pixels.h"
 #include "common/scene/scene.h"
 
 namespace meshwright {
@@ -20,14 +21,22 @@ Camera UndistortedCamera(const SceneView& view, int max_image_size);
 struct View {
   Camera camera;
   ColorImage color;
+  IgnoredPixels ignored;  // of color
 };
 
-// Decodes view.image_path (EXIF rotation ignored), checks its size against the lens, undistorts and scales.
-// Errors name the file and what was expected: NotFound, InvalidArgument (not a picture, truncated, wrong size).
+// Decodes view.image_path and its mask (EXIF rotation ignored), checks its size against the lens, undistorts and
+// scales. Errors name the file and what was expected: NotFound, InvalidArgument (not a picture, truncated, wrong size).
 absl::StatusOr<View> LoadView(const SceneView& view, int max_image_size);
 
-// The same for a picture's bytes, wherever they come from; view.image_path stands for the file in errors.
-absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& picture_bytes, int max_image_size);
+// The same for a picture's and a mask's bytes, wherever they come from; view.image_path and view.mask_path stand for
+// the files in errors. Without a mask_path `mask_bytes` are not looked at. A mask may be smaller or larger than its
+// picture by one factor.
+absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& picture_bytes, const std::string& mask_bytes,
+                                int max_image_size);
+
+// Decodes a mask for a picture of this size, black and white as BlackAndWhite makes it. InvalidArgument: not a picture,
+// or a size that is not the picture's but for one factor.
+absl::StatusOr<ColorImage> DecodeMask(const SceneView& view, const std::string& mask_bytes);
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

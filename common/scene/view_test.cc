@@ -200,6 +200,51 @@ TEST(LoadView, NamesFileAndSizes) {
   EXPECT_EQ(LoadView(view, 0).status().code(), absl::StatusCode::kNotFound);
 }
 
+// A mask whose left `columns` are black.
+std::string LeftBlack(int width, int height, int columns) {
+  ColorImage mask{.width = width, .height = height, .rgb = {}};
+  for (int i = 0; i < width * height; ++i) mask.rgb.insert(mask.rgb.end(), 3, i % width < columns ? 0 : 255);
+  return EncodePng(mask);
+}
+
+TEST(LoadView, AMaskGoesTheWayOfItsPicture) {
+  for (const Lens& lens : {MakeLens(Lens::Model::kPinhole, {}), MakeLens(Lens::Model::kRadial, {-0.15, 0.02})}) {
+    SceneView view = WriteView(lens, "masked");
+    view.mask_path = view.image_path + ".png";
+    for (const int factor : {1, 2}) {
+      const int black = 100;
+      ASSERT_TRUE(
+          WriteFileAtomically(view.mask_path, LeftBlack(lens.width / factor, lens.height / factor, black / factor))
+              .ok());
+      for (const int max_image_size : {0, 140}) {
+        const absl::StatusOr<View> loaded = LoadView(view, max_image_size);
+        ASSERT_TRUE(loaded.ok()) << loaded.status();
+        const Camera& camera = loaded->camera;
+        // Whatever has anything of the black side is ignored, and not much more than that.
+        const double reach = 2.5 * std::max(1.0, lens.fx / camera.fx) * factor;
+        for (int y = 0; y < camera.height; y += 3) {
+          for (int x = 0; x < camera.width; ++x) {
+            const double in_picture = lens.PixelFromPlane(camera.RayInCam(x + 0.5, y + 0.5).head<2>()).x();
+            if (in_picture < black) EXPECT_TRUE(loaded->ignored.At(x, y)) << x << " " << y;
+            if (in_picture > black + reach) EXPECT_FALSE(loaded->ignored.At(x, y)) << x << " " << y;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(LoadView, AMaskOfAnotherShapeIsRefused) {
+  const Lens lens = MakeLens(Lens::Model::kPinhole, {});
+  SceneView view = WriteView(lens, "misfit");
+  view.mask_path = view.image_path + ".png";
+  ASSERT_TRUE(WriteFileAtomically(view.mask_path, LeftBlack(lens.height, lens.width, 3)).ok());
+  EXPECT_THAT(std::string(LoadView(view, 0).status().message()),
+              AllOf(HasSubstr("misfit.png.png: the mask has 240 x 320 px"), HasSubstr("320 x 240")));
+  ASSERT_TRUE(WriteFileAtomically(view.mask_path, "no picture").ok());
+  EXPECT_EQ(LoadView(view, 0).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
 }  // namespace
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -193,6 +193,7 @@ absl::Status ReconstructionDriver::PrepareScene(const ReconstructionConfig& conf
   for (const SceneView& view : scene.views) {
     cameras_.push_back(UndistortedCamera(view, config.max_image_size));
     photographs_[view.image_path] = view.name;
+    if (!view.mask_path.empty()) photographs_[view.mask_path] = view.name + " (its mask)";
   }
   points_ = std::move(scene.points);
   offset_ = scene.offset;

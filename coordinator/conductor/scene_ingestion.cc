@@ -74,11 +74,13 @@ absl::Status CheckLinks(const fs::path& folder, const fs::path& root) {
 
 absl::Status CheckPhotographs(const Scene& scene, const fs::path& root) {
   for (const SceneView& view : scene.views) {
-    std::error_code error;
-    const fs::path real = fs::canonical(view.image_path, error);
-    if (error || IsBelow(real, root)) continue;  // what is not there is said by whoever reads it
-    return BadInput(absl::InvalidArgumentError(
-        absl::StrCat("photograph \"", view.name.substr(0, 100), "\" lies outside of the scene's folder")));
+    for (const std::string& path : {view.image_path, view.mask_path}) {
+      std::error_code error;
+      const fs::path real = fs::canonical(path, error);
+      if (path.empty() || error || IsBelow(real, root)) continue;  // what is not there is said by whoever reads it
+      return BadInput(absl::InvalidArgumentError(
+          absl::StrCat("photograph \"", view.name.substr(0, 100), "\" lies outside of the scene's folder")));
+    }
   }
   return absl::OkStatus();
 }
@@ -97,6 +99,9 @@ absl::StatusOr<IngestedScene> IngestConfined(const std::string& folder, const st
   for (SceneView& view : scene->views) {
     MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(view.image_path));
     MW_ASSIGN_OR_RETURN(view.image_path, blobs.Put(bytes));
+    if (view.mask_path.empty()) continue;
+    MW_ASSIGN_OR_RETURN(const std::string mask, ReadFile(view.mask_path));
+    MW_ASSIGN_OR_RETURN(view.mask_path, blobs.Put(mask));
   }
   MW_ASSIGN_OR_RETURN(taken.scene_blob, blobs.Put(EncodeScene(*scene)));
   return taken;

@@ -83,6 +83,8 @@ absl::StatusOr<Inspection> Inspect(const Scene& scene, const ReconstructionOptio
   inspection.warnings = scene.warnings;
   inspection.offset = scene.offset;
   inspection.photographs = static_cast<int>(scene.views.size());
+  inspection.masks = static_cast<int>(std::count_if(scene.views.begin(), scene.views.end(),
+                                                    [](const SceneView& view) { return !view.mask_path.empty(); }));
   inspection.width = width.range();
   inspection.height = height.range();
   inspection.sparse_points = static_cast<int64_t>(scene.points.size());
@@ -106,6 +108,7 @@ Json ToJson(const Inspection& inspection) {
       {"warnings", inspection.warnings},
       {"offset", {inspection.offset.x(), inspection.offset.y(), inspection.offset.z()}},
       {"photographs", inspection.photographs},
+      {"masks", inspection.masks},
       {"width", RangeToJson(inspection.width)},
       {"height", RangeToJson(inspection.height)},
       {"pixels", inspection.pixels},
@@ -129,6 +132,7 @@ std::string ToText(const Inspection& inspection) {
   std::string text;
   absl::StrAppendFormat(&text, "scene      %s, %d photographs, %d sparse points\n", inspection.format,
                         inspection.photographs, inspection.sparse_points);
+  if (inspection.masks > 0) absl::StrAppendFormat(&text, "masks      of %d photographs\n", inspection.masks);
   if (!inspection.offset.isZero(0)) {
     absl::StrAppendFormat(&text, "           far from zero: computed relative to %.10g %.10g %.10g\n",
                           inspection.offset.x(), inspection.offset.y(), inspection.offset.z());

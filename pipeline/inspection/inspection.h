@@ -27,6 +27,7 @@ struct Inspection {
   std::vector<std::string> warnings;  // of the scene: what was left out of it, and other scenes in the folder
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // Scene::offset
   int photographs = 0;
+  int masks = 0;     // photographs that have one
   SizeRange width;   // px, as used: undistorted and scaled
   SizeRange height;  // px
   int64_t pixels = 0;

@@ -49,11 +49,12 @@ std::vector<float> GradientMagnitude(const ColorImage& image, ThreadPool& pool) 
 class FaceExaminer {
  public:
   FaceExaminer(const TriangleMesh& mesh, const DepthRaster& raster, CameraIndex camera, const ColorImage& image,
-               const std::vector<float>& gradient)
+               const IgnoredPixels& ignored, const std::vector<float>& gradient)
       : mesh_(mesh),
         raster_(raster),
         camera_(camera),
         image_(image),
+        ignored_(ignored),
         gradient_(gradient),
         center_(raster.camera().center_in_world()) {}
 
@@ -77,6 +78,7 @@ class FaceExaminer {
  private:
   struct Sums {
     double pixels = 0;
+    bool ignored = false;
     double visible = 0;
     double clear = 0;  // visible, and no silhouette near
     double gradient = 0;
@@ -97,6 +99,7 @@ class FaceExaminer {
     const auto add = [&](int x, int y, double inverse_depth) {
       const auto i = static_cast<size_t>(y) * static_cast<size_t>(image_.width) + static_cast<size_t>(x);
       sums.pixels += 1;
+      sums.ignored = sums.ignored || ignored_.At(x, y);
       if (raster_.NearestInverseDepth(x, y) < inverse_depth + step) sums.visible += 1;
       if (raster_.NearestAround(x, y) < inverse_depth + step) sums.clear += 1;
       sums.gradient += gradient_[i];
@@ -110,7 +113,7 @@ class FaceExaminer {
       add(static_cast<int>(middle.x()), static_cast<int>(middle.y()),
           raster_.InverseDepth(face, Eigen::Vector3d::Constant(1.0 / 3)));
     }
-    if (sums.visible < kMinVisible * sums.pixels) return std::nullopt;
+    if (sums.ignored || sums.visible < kMinVisible * sums.pixels) return std::nullopt;
     FaceView view;
     view.camera = camera_;
     view.quality = static_cast<float>(triangle.area() * (sums.gradient / sums.pixels + kFlatGradient));
@@ -126,6 +129,7 @@ class FaceExaminer {
   const DepthRaster& raster_;
   const CameraIndex camera_;
   const ColorImage& image_;
+  const IgnoredPixels& ignored_;
   const std::vector<float>& gradient_;
   const Eigen::Vector3d center_;
 };
@@ -182,9 +186,9 @@ void FaceViews::Add(size_t face, const FaceView& view) {
 }
 
 void FaceViews::AddPhotograph(const TriangleMesh& mesh, const DepthRaster& raster, CameraIndex camera,
-                              const ColorImage& image, ThreadPool& pool) {
+                              const ColorImage& image, const IgnoredPixels& ignored, ThreadPool& pool) {
   const std::vector<float> gradient = GradientMagnitude(image, pool);
-  const FaceExaminer examiner(mesh, raster, camera, image, gradient);
+  const FaceExaminer examiner(mesh, raster, camera, image, ignored, gradient);
   pool.ParallelFor(static_cast<int64_t>(faces()), kFacesAtOnce, [&](int64_t begin, int64_t end) {
     for (auto f = static_cast<size_t>(begin); f < static_cast<size_t>(end); ++f) {
       if (const std::optional<FaceView> view = examiner.Examine(mesh.faces[f])) Add(f, *view);

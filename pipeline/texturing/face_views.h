@@ -11,6 +11,7 @@
 #include "common/base/ids.h"
 #include "common/base/thread_pool.h"
 #include "common/image/color_image.h"
+#include "common/image/ignored_pixels.h"
 #include "common/mesh/triangle_mesh.h"
 
 namespace meshwright {
@@ -36,10 +37,10 @@ class FaceViews {
   absl::Span<const FaceView> Of(size_t face) const { return {&views_[face * kMost], counts_[face]}; }
 
   // Adds the photograph of raster.camera() to all faces that it sees: from the front, 2 px from the photograph's
-  // border, with at least half of it before everything else. Sure of that is one at less than 75 degrees from the
-  // normal and clear of silhouettes; others are for faces that no photograph is sure of.
+  // border, without ignored pixels, with at least half of it before everything else. Sure of that is one at less than
+  // 75 degrees from the normal and clear of silhouettes; others are for faces that no photograph is sure of.
   void AddPhotograph(const TriangleMesh& mesh, const DepthRaster& raster, CameraIndex camera, const ColorImage& image,
-                     ThreadPool& pool);
+                     const IgnoredPixels& ignored, ThreadPool& pool);
 
   // Leaves out, for each face, photographs that show less of it than the best does, and those whose colour differs from
   // what most others have there (section 4.2: moving things, occluders that were not reconstructed). Until then a face

@@ -65,7 +65,7 @@ class Texturing {
     for (size_t i = 0; i < cameras_.size(); ++i) {
       const DepthRaster raster(mesh_, cameras_[i], pool_);
       MW_ASSIGN_OR_RETURN(const View view, Load(i));
-      views.AddPhotograph(mesh_, raster, static_cast<CameraIndex>(i), view.color, pool_);
+      views.AddPhotograph(mesh_, raster, static_cast<CameraIndex>(i), view.color, view.ignored, pool_);
       Tell();
     }
     views.RemoveOutliers(pool_);

@@ -147,7 +147,8 @@ TEST(SceneErrorsTest, NameFileFieldValueAndWhatWasExpected) {
       AllOf(HasSubstr("reconstruction.json"), HasSubstr("projection_type is \"spherical\"; expected perspective")));
   EXPECT_THAT(Refusal(Changed("opensfm", "reconstruction.json", "\"shots\"", "\"shotz\"")),
               HasSubstr("[0].shots is missing"));
-  EXPECT_THAT(Refusal(Changed("opensfm", "tracks.csv", "a.png\t0", "a.png 0")), HasSubstr("tracks.csv, line 2"));
+  EXPECT_THAT(Refusal(Changed("opensfm", "tracks.csv", "a.png\t0\t7\t0.1\t0.2\t1\t1\t2\t3", "a.png\t0")),
+              HasSubstr("tracks.csv, line 2"));
   EXPECT_THAT(Refusal(Changed("alicevision", "cameras.sfm", "\"brown\"", "\"3deanamorphic4\"")),
               HasSubstr("distortion is \"3deanamorphic4\" with 5 parameters; expected none, radialk1"));
   EXPECT_THAT(Refusal(Changed("alicevision", "cameras.sfm", "\"poses\"", "\"pozes\"")),
@@ -171,7 +172,8 @@ TEST(SceneErrorsTest, NameFileFieldValueAndWhatWasExpected) {
               HasSubstr("bundle.out, line 2: number of cameras is 5; expected that of the names in"));
   EXPECT_THAT(Refusal(Changed("nvm", "model.nvm", "NVM_V3", "NVM_V2")),
               HasSubstr("model.nvm, line 1: first word is \"NVM_V2\"; expected NVM_V3"));
-  EXPECT_THAT(Refusal(Changed("mvsnet", "cams/a_cam.txt", "20 0 6.25", "20 0 12.5")), HasSubstr("principal point"));
+  EXPECT_THAT(Refusal(Changed("mvsnet", "cams/a_cam.txt", "20 0 6.25\n0 21 4.625", "20 0 12.5\n0 21 9.25")),
+              HasSubstr("principal point"));
   EXPECT_THAT(Refusal(Changed("openmvs", "scene.mvs", "MVSI", std::string("MVS\0", 4))),
               HasSubstr("expected MVSI, which --archive-type -1 writes"));
 }

@@ -49,8 +49,13 @@ absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::Make(const std::s
                      max_image_size](CameraIndex camera) -> absl::StatusOr<View> {
     SceneView view = scene.views[static_cast<size_t>(camera)];
     MW_ASSIGN_OR_RETURN(const std::string picture, blobs.Get(view.image_path));
+    std::string mask;
+    if (!view.mask_path.empty()) {
+      MW_ASSIGN_OR_RETURN(mask, blobs.Get(view.mask_path));
+      view.mask_path = view.name + " (its mask)";
+    }
     view.image_path = view.name;  // what errors should name
-    return DecodeView(view, picture, max_image_size);
+    return DecodeView(view, picture, mask, max_image_size);
   };
   context->views = std::make_unique<ViewCache>(load, cache_bytes_);
   context->inputs = std::make_unique<CameraJobInputMaker>(context->scene, context->cameras, *context->views, blobs_,

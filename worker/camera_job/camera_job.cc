@@ -56,7 +56,7 @@ absl::Status CameraJobOptions::Validate() const {
 PatchScorer MakeScorer(const CameraJobInput& input, const PatchScorer::Options& options) {
   std::vector<ScoredView> targets;
   for (const JobView& target : input.targets) targets.push_back({target.camera, target.grey});
-  return PatchScorer({input.reference.camera, input.reference.grey}, std::move(targets), options);
+  return PatchScorer({input.reference.camera, input.reference.grey}, std::move(targets), options, input.region);
 }
 
 CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
@@ -80,7 +80,9 @@ CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJo
   const SeedingResult seeding =
       FindSeeds(scorer, ObservationsOf(input), input.accepted, input.accepted.lattice, options.seeding, pool);
   for (size_t t = 0; t < input.targets.size(); ++t) {
-    if (seeding.matches_per_target[t] < options.seeding.min_seeds_per_pair) {
+    // A region has few seeds however good a pair is.
+    const bool is_weak = seeding.matches_per_target[t] < options.seeding.min_seeds_per_pair;
+    if (is_weak && !input.region.has_value()) {
       result.weak_targets.push_back(input.targets[t].camera_index);
     }
   }

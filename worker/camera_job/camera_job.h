@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "common/base/ids.h"
 #include "common/base/thread_pool.h"
 #include "common/geometry/camera.h"
+#include "common/geometry/oriented_box.h"
 #include "common/image/color_image.h"
 #include "common/image/sampling_image.h"
 #include "common/surface/patch_lattice.h"
@@ -48,6 +50,7 @@ struct CameraJobInput {
   std::vector<Eigen::Vector3d> sparse_points;  // SfM points that the reference camera saw, world frame
   std::vector<std::vector<CameraIndex>> sparse_points_seen_by;  // parallel to sparse_points
   AcceptedDepth accepted;                                       // V_r as of the job's snapshot
+  std::optional<OrientedBox> region;                            // in the world; nothing is looked for outside of it
 };
 
 constexpr int kMaxTargets = 16;

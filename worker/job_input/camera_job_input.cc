@@ -42,6 +42,7 @@ absl::StatusOr<CameraJobInputMaker::Prepared> CameraJobInputMaker::Make(const Ca
                                                                         ThreadPool& pool) const {
   Prepared prepared;
   const absl::Time start = absl::Now();
+  prepared.input.region = scene_.region;
   MW_RETURN_IF_ERROR(LoadViews(spec, prepared.input, pool));
   const absl::Time loaded = absl::Now();
   MW_RETURN_IF_ERROR(AddAcceptedSurfaces(spec, prepared.input, pool));

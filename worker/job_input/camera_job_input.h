@@ -34,6 +34,7 @@ class CameraJobInputMaker {
   // Bad input: a photograph cannot be used (any more). Other errors are the BlobStore's. Thread-safe.
   absl::StatusOr<Prepared> Make(const CameraJobSpec& spec, ThreadPool& pool) const;
 
+  int lattice_step() const { return lattice_step_; }  // px
   const Camera& camera(CameraIndex index) const { return cameras_[static_cast<size_t>(index)]; }
 
   int64_t EstimateBytes(const CameraJobSpec& spec) const { return EstimateInputBytes(spec, cameras_, lattice_step_); }

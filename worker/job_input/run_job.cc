@@ -55,6 +55,14 @@ Json MakeJobReport(const Scene& scene, const CameraJobSpec& spec, const CameraJo
 absl::StatusOr<FinishedJob> RunJob(const Scene& scene, const CameraJobSpec& spec, const CameraJobInputMaker& inputs,
                                    const CameraJobFunction& job, BlobStore& blobs, ThreadPool& pool) {
   FinishedJob finished;
+  // A camera that sees none of the region has nothing to do, not even to load photographs.
+  if (scene.region.has_value() && !SeesAnyOf(inputs.camera(spec.camera), *scene.region, inputs.lattice_step())) {
+    finished.report.rays = Lattice::For(inputs.camera(spec.camera), inputs.lattice_step()).nodes();
+    finished.report_json = JsonText(MakeJobReport(scene, spec, finished.report, 0));
+    const PatchLattice nothing = PatchLattice::Empty(spec.camera, inputs.camera(spec.camera), inputs.lattice_step());
+    MW_ASSIGN_OR_RETURN(finished.filtered_digest, blobs.Put(EncodeSurface(nothing)));
+    return finished;
+  }
   MW_ASSIGN_OR_RETURN(CameraJobInputMaker::Prepared prepared, inputs.Make(spec, pool));
   CameraJobResult result = job(prepared.input, pool);
   result.report.seconds_visibility = prepared.seconds_visibility;

@@ -52,7 +52,8 @@ absl::StatusOr<std::shared_ptr<const SamplingImage>> ViewCache::Grey(CameraIndex
   }
   absl::StatusOr<View> view = loader_(camera);
   std::shared_ptr<const SamplingImage> grey;
-  if (view.ok()) grey = std::make_shared<const SamplingImage>(ToGrey(view->color), kSamplingLevels);
+  if (view.ok())
+    grey = std::make_shared<const SamplingImage>(ToGrey(view->color), kSamplingLevels, std::move(view->ignored));
   {
     const MutexLock lock(mutex_);
     entries_[camera].loading = false;
@@ -75,7 +76,8 @@ absl::StatusOr<ViewCache::Reference> ViewCache::GreyAndColor(CameraIndex camera)
     reference.grey = Find(camera);
   }
   if (reference.grey == nullptr) {
-    reference.grey = std::make_shared<const SamplingImage>(ToGrey(view.color), kSamplingLevels);
+    reference.grey =
+        std::make_shared<const SamplingImage>(ToGrey(view.color), kSamplingLevels, std::move(view.ignored));
     const MutexLock lock(mutex_);
     Keep(camera, reference.grey);
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <Eigen/LU>
@@ -61,7 +62,8 @@ struct PatchScorer::Target {
   Eigen::Vector3d center_in_reference;  // scene units
 };
 
-PatchScorer::PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options)
+PatchScorer::PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options,
+                         const std::optional<OrientedBox>& region)
     : reference_(std::move(reference)), targets_(std::move(targets)), options_(options) {
   MW_CHECK(options_.window_radius >= 1 && options_.window_radius <= 7);
   const int side = 2 * options_.window_radius + 1;
@@ -76,6 +78,7 @@ PatchScorer::PatchScorer(ScoredView reference, std::vector<ScoredView> targets, 
   for (size_t d = 0; d < similarity_.size(); ++d) {
     similarity_[d] = static_cast<float>(std::exp(-static_cast<double>(d) / options_.similarity_scale));
   }
+  if (region.has_value()) region_in_reference_ = Transformed(reference_.camera.cam_from_world, *region);
   for (const ScoredView& view : targets_) {
     const Rigid3 target_from_reference = view.camera.cam_from_world * Inverse(reference_.camera.cam_from_world);
     // Sampling coordinates have the centre of the top-left pixel at (0, 0).
@@ -90,12 +93,26 @@ PatchScorer::PatchScorer(ScoredView reference, std::vector<ScoredView> targets, 
 
 PatchScorer::~PatchScorer() = default;
 
+bool PatchScorer::SetRange(int x, int y, Window& window) const {
+  window.min_w = 0;
+  window.max_w = std::numeric_limits<float>::infinity();
+  if (!region_in_reference_.has_value()) return true;
+  const auto depths = DepthsInside(*region_in_reference_, reference_.camera.RayInCam(x + 0.5, y + 0.5));
+  if (!depths.has_value()) return false;
+  window.min_w = static_cast<float>(1 / depths->max);
+  window.max_w = static_cast<float>(1 / depths->min);
+  return true;
+}
+
 void PatchScorer::MakeWindow(int x, int y, Window& window) const {
   const int radius = options_.window_radius;
   const SamplingImage& image = *reference_.grey;
   window.usable = false;
   window.sigma = 0;
   if (x < radius || y < radius || x + radius >= image.width() || y + radius >= image.height()) return;
+  const IgnoredPixels& ignored = image.ignored();
+  if (ignored.At(x, y) || !SetRange(x, y, window)) return;
+  const bool has_ignored = ignored.AnyIn(x - radius, y - radius, x + radius, y + radius);
   const SamplingImage::Level& level = image.level(0);
   int sum = 0;
   int sum_of_squares = 0;
@@ -120,7 +137,11 @@ void PatchScorer::MakeWindow(int x, int y, Window& window) const {
   float total = 0;
   for (int i = 0; i < samples_; ++i) {
     const int difference = std::abs(static_cast<int>(window.values[i]) - center);
-    const float weight = similarity_[static_cast<size_t>(difference)];
+    float weight = similarity_[static_cast<size_t>(difference)];
+    if (has_ignored && ignored.At(x + static_cast<int>(dx_[static_cast<size_t>(i)]),
+                                  y + static_cast<int>(dy_[static_cast<size_t>(i)]))) {
+      weight = 0;
+    }
     window.weights[i] = weight;
     total += weight;
   }
@@ -144,7 +165,7 @@ void PatchScorer::MakeWindow(int x, int y, Window& window) const {
 }
 
 float PatchScorer::Score(const Window& window, int x, int y, const PatchPlane& plane, int target) const {
-  if (!window.usable || !(plane.w > 0)) return kNoScore;
+  if (!window.usable || !(plane.w > 0) || plane.w < window.min_w || plane.w > window.max_w) return kNoScore;
   const Target& geometry = geometry_[static_cast<size_t>(target)];
   const float x0 = static_cast<float>(x) + 0.5F;
   const float y0 = static_cast<float>(y) + 0.5F;
@@ -190,13 +211,27 @@ float PatchScorer::Score(const Window& window, int x, int y, const PatchPlane& p
   // A homography maps the window to a convex quadrilateral: it lies in the image when its corners do.
   const float max_x = static_cast<float>(level.width - 1) - kBorderMargin;
   const float max_y = static_cast<float>(level.height - 1) - kBorderMargin;
+  float left = max_x;
+  float right = 0;
+  float top = max_y;
+  float bottom = 0;
   for (const float corner_x : {-radius, radius}) {
     for (const float corner_y : {-radius, radius}) {
       const float third = input.c[2] + input.col0[2] * corner_x + input.col1[2] * corner_y;
       const float tx = (input.c[0] + input.col0[0] * corner_x + input.col1[0] * corner_y) / third;
       const float ty = (input.c[1] + input.col0[1] * corner_x + input.col1[1] * corner_y) / third;
       if (!(tx >= kBorderMargin && ty >= kBorderMargin && tx <= max_x && ty <= max_y)) return kNoScore;
+      left = std::min(left, tx);
+      right = std::max(right, tx);
+      top = std::min(top, ty);
+      bottom = std::max(bottom, ty);
     }
+  }
+  if (image.ignored()) {
+    // The pixels of level 0 below the rectangle around the window's image, with those that samples reach.
+    const auto first = [&](float c) { return static_cast<int>(c) << level_index; };
+    const auto last = [&](float c) { return ((static_cast<int>(c) + 2) << level_index) - 1; };
+    if (image.ignored().AnyIn(first(left), first(top), last(right), last(bottom))) return kNoScore;
   }
   input.count = padded_samples_;
   input.dx = dx_.data();

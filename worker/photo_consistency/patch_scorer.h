@@ -3,12 +3,14 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 #include <absl/status/status.h>
 
 #include "common/geometry/camera.h"
+#include "common/geometry/oriented_box.h"
 #include "common/image/sampling_image.h"
 
 namespace meshwright {
@@ -40,7 +42,8 @@ struct ScoredView {
 // window beside a depth step follows its own side (Yoon and Kweon 2006, adaptive support weights). Thread-safe.
 class PatchScorer {
  public:
-  // What Score() returns when there is nothing to compare: the window leaves an image, the plane goes through a camera
+  // What Score() returns when there is nothing to compare: the window leaves an image or has ignored pixels of the
+  // target, the patch is outside of the region, the plane goes through a camera
   // or is seen from behind, or the reference window has no texture.
   static constexpr float kNoScore = -2.0F;
 
@@ -52,7 +55,9 @@ class PatchScorer {
     absl::Status Validate() const;
   };
 
-  PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options);
+  // `region`, in the world: patches outside of it have no score, and no window is usable whose ray passes by.
+  PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options,
+              const std::optional<OrientedBox>& region = std::nullopt);
   ~PatchScorer();
 
   const Camera& reference() const { return reference_.camera; }
@@ -66,10 +71,12 @@ class PatchScorer {
     // MakeWindow fills the arrays; clearing them before would cost as much again.
     Window() {}  // NOLINT(cppcoreguidelines-pro-type-member-init,modernize-use-equals-default)
 
-    float weights[232];   // sum to 1; padded with zeros to whole groups
-    float values[232];    // weight * (grey - mean) / weighted standard deviation; padded likewise
-    float sigma = 0;      // grey levels
-    bool usable = false;  // inside the image and textured
+    float weights[232];  // sum to 1; padded with zeros to whole groups
+    float values[232];   // weight * (grey - mean) / weighted standard deviation; padded likewise
+    float sigma = 0;     // grey levels
+    float min_w = 0;     // inverse depths that the region has on the centre's ray, 1 / scene units
+    float max_w = 0;
+    bool usable = false;  // inside the image and the region, its centre not ignored, and textured
   };
   void MakeWindow(int x, int y, Window& window) const;
 
@@ -88,8 +95,12 @@ class PatchScorer {
 
  private:
   struct Target;
+  // Sets the window's inverse depths; false when the ray of pixel (x, y) passes by the region.
+  bool SetRange(int x, int y, Window& window) const;
+
   ScoredView reference_;
   std::vector<ScoredView> targets_;
+  std::optional<OrientedBox> region_in_reference_;
   Options options_;
   std::vector<Target> geometry_;
   int samples_ = 0;         // (2 s + 1)^2

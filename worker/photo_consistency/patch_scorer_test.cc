@@ -240,6 +240,58 @@ TEST(SamplingImage, QuadsHoldTheirFourPixels) {
   }
 }
 
+// A photograph of noise whose columns from `begin` to `end` are not to be used.
+std::shared_ptr<const SamplingImage> MaskedNoise(uint32_t seed, int begin, int end) {
+  constexpr int kSide = 80;
+  ColorImage mask{.width = kSide, .height = kSide, .rgb = {}};
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const bool is_ignored = i % kSide >= begin && i % kSide < end;
+    mask.rgb.insert(mask.rgb.end(), 3, is_ignored ? 0 : 255);
+  }
+  return std::make_shared<const SamplingImage>(Noise(kSide, kSide, seed), 1, IgnoredPixels(mask));
+}
+
+TEST(PatchScorer, IgnoredPixelsAreAsThoseBeyondTheBorder) {
+  const Camera camera = MakeCamera(80, 80, {0, 0, 0}, 0);
+  const PatchPlane facing = {0.2F, 0, 0};
+  const int radius = PatchScorer::Options().window_radius;
+  // Reference and target are one photograph, so that a window is compared with itself.
+  const PatchScorer of_target({camera, MaskedNoise(5, 0, 0)}, {{camera, MaskedNoise(5, 40, 50)}}, {});
+  const PatchScorer of_reference({camera, MaskedNoise(5, 40, 50)}, {{camera, MaskedNoise(5, 0, 0)}}, {});
+  PatchScorer::Window window;
+  for (int x = 10; x < 70; ++x) {
+    of_target.MakeWindow(x, 40, window);
+    ASSERT_TRUE(window.usable);
+    const float score = of_target.Score(window, x, 40, facing, 0);
+    if (x + radius >= 40 && x - radius < 50) EXPECT_EQ(score, PatchScorer::kNoScore) << x;
+    if (x + radius + 2 < 40 || x - radius - 2 >= 50) EXPECT_GT(score, 0.99F) << x;
+
+    of_reference.MakeWindow(x, 40, window);
+    EXPECT_EQ(window.usable, x < 40 || x >= 50) << x;
+    if (window.usable) EXPECT_GT(of_reference.Score(window, x, 40, facing, 0), 0.99F) << x;
+    for (int k = 0; window.usable && k < 2 * radius + 1; ++k) {
+      if (x - radius + k >= 40 && x - radius + k < 50) EXPECT_EQ(window.weights[k], 0) << x;
+    }
+  }
+}
+
+TEST(PatchScorer, OutsideOfTheRegionNothingHasAScore) {
+  const Camera camera = MakeCamera(80, 80, {0, 0, 0}, 0.2);
+  const auto noise = MaskedNoise(5, 0, 0);
+  const Eigen::Vector3d center = camera.BackProject(40.5, 40.5, 5);
+  const OrientedBox box = {.center = center, .axes = Eigen::Matrix3d::Identity(), .size = {0.4, 0.4, 0.4}};
+  const PatchScorer scorer({camera, noise}, {{camera, noise}}, {}, box);
+  PatchScorer::Window window;
+  for (int x = 10; x < 70; ++x) {
+    scorer.MakeWindow(x, 40, window);
+    for (const double z : {2.0, 4.7, 4.9, 5.0, 5.1, 5.3, 9.0}) {
+      const bool inside = box.Contains(camera.BackProject(x + 0.5, 40.5, z));
+      const float score = scorer.Score(window, x, 40, {static_cast<float>(1 / z), 0, 0}, 0);
+      EXPECT_EQ(score > PatchScorer::kNoScore, inside) << x << " " << z;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -93,8 +93,8 @@ class RowRing {
 };
 
 // Corners of the rows [begin, end), which are one row of cells.
-std::vector<Corner> CornersOfStrip(const SamplingImage::Level& level, const HarrisOptions& options, int begin,
-                                   int end) {
+std::vector<Corner> CornersOfStrip(const SamplingImage& image, const HarrisOptions& options, int begin, int end) {
+  const SamplingImage::Level& level = image.level(0);
   const int width = level.width;
   const int first = std::max(begin, kHarrisMargin);
   const int last = std::min(end, level.height - kHarrisMargin) - 1;
@@ -122,7 +122,7 @@ std::vector<Corner> CornersOfStrip(const SamplingImage::Level& level, const Harr
     float* peaks = scratch[4];
     PeakRow(above, here, response[row + 1], width, options.min_response, scratch[3], peaks);
     for (int x = kHarrisMargin; x < width - kHarrisMargin; ++x) {
-      if (peaks[x] <= 0 || !IsFirstOfPlateau(above, here, x)) continue;
+      if (peaks[x] <= 0 || !IsFirstOfPlateau(above, here, x) || image.ignored().At(x, row)) continue;
       cells[static_cast<size_t>(x / options.cell_size)].push_back({x, row, peaks[x]});
     }
   }
@@ -147,7 +147,7 @@ std::vector<Corner> DetectHarrisCorners(const SamplingImage& image, const Harris
     for (int64_t i = begin; i < end; ++i) {
       const int top = static_cast<int>(i) * options.cell_size;
       const int bottom = std::min(top + options.cell_size, level.height);
-      of_strip[static_cast<size_t>(i)] = CornersOfStrip(level, options, top, bottom);
+      of_strip[static_cast<size_t>(i)] = CornersOfStrip(image, options, top, bottom);
     }
   });
   std::vector<Corner> corners;

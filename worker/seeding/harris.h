@@ -28,9 +28,10 @@ struct HarrisOptions {
 // Corners keep this distance to the image's border: half the support of the filter.
 constexpr int kHarrisMargin = 4;  // px
 
-// Corners of level 0, by cells row by row, strongest first within a cell. The response is the Harris measure of the
-// 3 x 3 Sobel gradients' moments under a 5 x 5 binomial window; corners are its maxima over 3 x 3 pixels. The image is
-// filtered in strips: memory beside the result is linear in its width, and threads do not change the result.
+// Corners of level 0 but for ignored pixels, by cells row by row, strongest first within a cell. The response is the
+// Harris measure of the 3 x 3 Sobel gradients' moments under a 5 x 5 binomial window; corners are its maxima over 3 x 3
+// pixels. The image is filtered in strips: memory beside the result is linear in its width, and threads do not change
+// the result.
 std::vector<Corner> DetectHarrisCorners(const SamplingImage& image, const HarrisOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright

@@ -18,6 +18,7 @@
 #include "common/base/status_macros.h"
 #include "common/base/utf8.h"
 #include "common/image/decode.h"
+#include "common/scene/formats/masks.h"
 #include "common/scene/formats/world_offset.h"
 #include "common/scene/undistorted_pinhole.h"
 
@@ -303,6 +304,7 @@ absl::StatusOr<Scene> AssembleScene(ImportedScene imported, const ImportOptions&
     new_index[old_index] = static_cast<CameraIndex>(scene.views.size());
     scene.views.push_back(std::move(views[old_index].view));
   }
+  MW_RETURN_IF_ERROR(FindMasks(imported.image_folders, options.masks_folder, &scene));
   MoveNearZero(&scene);
   OrderPoints(new_index, &scene.points);
   return scene;

@@ -7,10 +7,12 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include "common/base/status_macros.h"
 #include "common/scene/formats/assemble.h"
 #include "common/scene/formats/colmap_binary.h"
 #include "common/scene/formats/colmap_text.h"
 #include "common/scene/formats/formats.h"
+#include "common/scene/formats/region_file.h"
 
 namespace meshwright {
 namespace {
@@ -20,7 +22,11 @@ absl::StatusOr<Scene> ImportForced(const std::string& path, const ImportOptions&
   for (const SceneFormat& format : SceneFormats()) {
     if (*options.format == format.name) {
       const std::string found = format.find(path);
-      if (!found.empty()) return format.import(found, options);
+      if (!found.empty()) {
+        MW_ASSIGN_OR_RETURN(Scene scene, format.import(found, options));
+        MW_RETURN_IF_ERROR(SetRegion(options.region, path, &scene));
+        return scene;
+      }
       return absl::NotFoundError(absl::StrCat(path, ": no ", format.name, " scene; expected ", format.looks_for));
     }
     names.emplace_back(format.name);
@@ -64,8 +70,9 @@ absl::StatusOr<Scene> ImportScene(const std::string& path, const ImportOptions& 
     return absl::InvalidArgumentError(
         absl::StrCat(path, ": no scene of a known format; expected one of: ", absl::StrJoin(looked_for, "; ")));
   }
-  absl::StatusOr<Scene> scene = taken->import(taken_at, options);
-  if (scene.ok()) scene->warnings.insert(scene->warnings.end(), warnings.begin(), warnings.end());
+  MW_ASSIGN_OR_RETURN(Scene scene, taken->import(taken_at, options));
+  scene.warnings.insert(scene.warnings.end(), warnings.begin(), warnings.end());
+  MW_RETURN_IF_ERROR(SetRegion(options.region, path, &scene));
   return scene;
 }
 

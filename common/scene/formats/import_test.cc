@@ -488,6 +488,56 @@ TEST(ImportScene, PathsOfOtherMachines) {
   EXPECT_EQ(PortableImageName("./left\\a.png"), "left/a.png");
 }
 
+TEST(ImportScene, MasksAreFoundByTheirNames) {
+  SceneFiles files = SmallColmapText();
+  files["masks/a.png.png"] = SmallPicture();    // COLMAP
+  files["masks/b.png"] = SmallPicture();        // by the stem
+  files["images/c_mask.png"] = SmallPicture();  // OpenDroneMap
+  files["masks/d.png.png"] = SmallPicture();    // of no photograph
+  const Scene scene = ImportFresh("masks", files);
+  EXPECT_THAT(scene.views[0].mask_path, EndsWith("masks/a.png.png"));
+  EXPECT_THAT(scene.views[1].mask_path, EndsWith("masks/b.png"));
+  EXPECT_THAT(scene.views[2].mask_path, EndsWith("images/c_mask.png"));
+  EXPECT_THAT(scene.warnings, ElementsAre(AllOf(HasSubstr("1 masks belong to no photograph"), HasSubstr("d.png.png"))));
+  EXPECT_EQ(ImportFresh("no_masks", SmallColmapText()).views[0].mask_path, "");
+
+  const std::string folder = WriteFresh("masks", files);
+  WriteScene(folder, {{"elsewhere/a_mask.jpg", "x"}});
+  const absl::StatusOr<Scene> told = ImportScene(folder, {.masks_folder = folder + "/elsewhere"});
+  ASSERT_TRUE(told.ok()) << told.status();
+  EXPECT_THAT(told->views[0].mask_path, EndsWith("elsewhere/a_mask.jpg"));
+  EXPECT_EQ(told->views[1].mask_path, "");
+  EXPECT_EQ(ImportScene(folder, {.masks_folder = folder + "/none"}).status().code(), absl::StatusCode::kNotFound);
+  WriteScene(folder, {{"other/z.png", SmallPicture()}});
+  EXPECT_EQ(ImportScene(folder, {.masks_folder = folder + "/other"}).status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST(ImportScene, TheRegionIsReadFromItsFile) {
+  SceneFiles files = SmallColmapText();
+  files["region.json"] = "[0, 1, 2, 4, 3, 3]";
+  const Scene scene = ImportFresh("region", files);
+  ASSERT_TRUE(scene.region.has_value());
+  EXPECT_EQ(scene.region->center, Eigen::Vector3d(2, 2, 2.5));
+  EXPECT_EQ(scene.region->size, Eigen::Vector3d(4, 2, 1));
+  EXPECT_THAT(scene.warnings, ElementsAre(HasSubstr("--region none")));
+  const std::string folder = WriteFresh("region", files);
+  EXPECT_FALSE(ImportScene(folder, {.region = "none"})->region.has_value());
+  WriteScene(folder,
+             {{"box.json", R"({"center": [1, 1, 1], "axes": [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], "size": [1, 2, 3]})"}});
+  const absl::StatusOr<Scene> told = ImportScene(folder, {.region = folder + "/box.json"});
+  ASSERT_TRUE(told.ok()) << told.status();
+  EXPECT_TRUE(told->region->Contains({0.1, 1.4, 0}));  // y is the box's first direction, of length 1
+  EXPECT_FALSE(told->region->Contains({1.4, 1.6, 0}));
+
+  for (const auto& [text, expected] : {std::pair<const char*, const char*>{"[0, 1, 2, 4, 3]", "6 finite numbers"},
+                                       {"[0, 0, 0, 1, -1, 1]", "size is 1, -1, 1; expected three lengths more than 0"},
+                                       {"{\"center\": [1, 2, 3]}", "size is missing"},
+                                       {"{", "is not valid JSON"}}) {
+    files["region.json"] = text;
+    EXPECT_THAT(InvalidMessage(files), AllOf(HasSubstr("region.json"), HasSubstr(expected)));
+  }
+}
+
 TEST(ExportColmapText, ReadsBackTheSame) {
   const std::string folder = WriteFresh("export", SmallColmapBinary());
   const Scene scene = ImportScene(folder).value();

@@ -104,7 +104,9 @@ std::vector<std::string> PicturesIn(const std::string& folder) {
   std::vector<std::string> names = FilesEndingIn(folder, "");
   std::erase_if(names, [](const std::string& name) {
     const std::string ending = LowerCaseEnding(name);
-    return ending != ".jpg" && ending != ".jpeg" && ending != ".png";
+    const std::string stem = std::filesystem::path(name).stem().string();
+    const bool is_mask = stem.ends_with("_mask") || stem.ends_with(".mask");
+    return is_mask || (ending != ".jpg" && ending != ".jpeg" && ending != ".png");
   });
   return names;
 }
