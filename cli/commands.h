@@ -26,6 +26,7 @@ void AddEvaluateCommand(CLI::App& program, Run& run);
 void AddSynthesizeCommand(CLI::App& program, Run& run);
 void AddConvertCommand(CLI::App& program, Run& run);
 void AddCropCommand(CLI::App& program, Run& run);
+void AddWorkspaceCommand(CLI::App& program, Run& run);
 void AddRenderCommand(CLI::App& program, Run& run);
 void AddSubmitCommand(CLI::App& program, Run& run);
 void AddOptionsCommand(CLI::App& program, Run& run);

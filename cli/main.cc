@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
   AddInspectCommand(program, run);
   AddConvertCommand(program, run);
   AddCropCommand(program, run);
+  AddWorkspaceCommand(program, run);
   AddTextureCommand(program, run);
   AddToolCommands(program, run);
   AddOptionsCommand(program, run);
