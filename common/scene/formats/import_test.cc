@@ -488,6 +488,28 @@ TEST(ImportScene, PathsOfOtherMachines) {
   EXPECT_EQ(PortableImageName("./left\\a.png"), "left/a.png");
 }
 
+TEST(ImportScene, CoordinatesFarFromZeroGetAnOffset) {
+  const std::string folder = WriteFresh("far", SmallColmapText());
+  const Scene near = ImportScene(folder).value();
+  EXPECT_TRUE(near.offset.isZero(0));
+  for (const Eigen::Vector3d& by : {Eigen::Vector3d(500000, 4000000, 0), Eigen::Vector3d(4121900, 652900, -4797700)}) {
+    Scene moved = near;
+    moved.offset = by;
+    ASSERT_TRUE(ExportColmapText(moved, folder).ok());
+    const absl::StatusOr<Scene> far = ImportScene(folder);
+    ASSERT_TRUE(far.ok()) << far.status();
+    EXPECT_EQ(far->offset, by);
+    for (size_t i = 0; i < near.views.size(); ++i) {
+      const Rigid3& a = far->views[i].cam_from_world;
+      const Rigid3& b = near.views[i].cam_from_world;
+      EXPECT_LT((a.translation - b.translation).norm(), 1e-8);
+    }
+    for (size_t i = 0; i < near.points.size(); ++i) {
+      EXPECT_LT((far->points[i].x_in_world - near.points[i].x_in_world).norm(), 1e-8);
+    }
+  }
+}
+
 TEST(ImportScene, MasksAreFoundByTheirNames) {
   SceneFiles files = SmallColmapText();
   files["masks/a.png.png"] = SmallPicture();    // COLMAP

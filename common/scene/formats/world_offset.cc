@@ -49,7 +49,9 @@ void MoveNearZero(Scene* scene) {
 
   constexpr double kCoarsest = 100;
   const double step = std::min(kCoarsest, std::pow(10.0, std::ceil(std::log10(kCoarsest * spacing))));
-  for (int k = 0; k < 3; ++k) scene->offset[k] = std::round(centroid[k] / step) * step;
+  for (int k = 0; k < 3; ++k) {
+    if (std::abs(centroid[k]) > kSpacings * spacing) scene->offset[k] = std::round(centroid[k] / step) * step;
+  }
   for (SceneView& view : scene->views) {
     view.cam_from_world.translation += view.cam_from_world.rotation * scene->offset;
   }
