@@ -191,6 +191,11 @@ void AddSubmitCommand(CLI::App& program, Run& run) {
   command.add_option("--weight", arguments->weight, "share of the workers against other reconstructions")
       ->check(CLI::Range(0.001, 1000.0))
       ->capture_default_str();
+  command
+      .add_option("--region", arguments->scene.import.region,
+                  "a box (JSON) outside of which nothing is reconstructed, sent as the scene's region.json; \"none\"")
+      ->check(CLI::ExistingFile | CLI::IsMember({kNoRegion}))
+      ->type_name("FILE|none");
   command.add_flag("--wait", arguments->wait, "until it is over");
   command.add_option("-o,--output", arguments->output_path,
                      absl::StrCat("wait and write the mesh; its ending says the format: ", MeshFormatEndings()));

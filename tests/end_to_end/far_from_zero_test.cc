@@ -45,7 +45,7 @@ TEST_P(FarFromZeroTest, TheMeshIsMovedAndNothingElse) {
   EXPECT_TRUE(near.offset.isZero(0));
   EXPECT_FALSE(far.offset.isZero(0));
   // Poses differ in their last digits, so a few patches may be others.
-  const auto few = [](size_t count) { return 0.005 * static_cast<double>(count); };
+  const auto few = [](size_t count) { return 0.01 * static_cast<double>(count); };
   EXPECT_NEAR(far.positions.size(), near.positions.size(), few(near.positions.size()));
   EXPECT_NEAR(far.faces.size(), near.faces.size(), few(near.faces.size()));
   if (far.positions.size() == near.positions.size()) {
