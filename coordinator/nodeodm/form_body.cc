@@ -6,6 +6,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "common/base/status_macros.h"
+#include "common/json/json_text.h"
 #include "common/json/parse_json.h"
 
 namespace meshwright {
@@ -68,7 +69,7 @@ absl::Status FormBody::Finish() {
     if (!json.ok()) return absl::InvalidArgumentError(absl::StrCat("the body ", std::string(json.status().message())));
     if (!json->is_object()) return absl::InvalidArgumentError("the body is no JSON object");
     for (const auto& [name, value] : json->items()) {
-      fields_[name] = value.is_string() ? value.get<std::string>() : value.dump();
+      fields_[name] = value.is_string() ? value.get<std::string>() : JsonText(value);
     }
     return absl::OkStatus();
   }

@@ -10,6 +10,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "common/base/check.h"
+#include "common/json/json_text.h"
 #include "common/json/parse_json.h"
 
 namespace meshwright {
@@ -92,7 +93,7 @@ OdmOptions::OdmOptions(const std::string& own_options) {
   all.push_back(
       Described("skip-3dmodel", "bool", "false", "", "Leave out the textured model: surfaces and points alone"));
   for (const nlohmann::json& option : own_) all.push_back(DescribeOwn(option));
-  description_ = all.dump();
+  description_ = JsonText(all);
 }
 
 absl::StatusOr<OdmTaskOptions> OdmOptions::Parse(const std::string& json) const {
@@ -141,7 +142,7 @@ std::string OwnOptionsJson(const OdmTaskOptions& options, int longest_side_px) {
   if (is_scaled && !own.contains(kMaxImageSize)) {
     own[kMaxImageSize] = std::max(1, static_cast<int>(std::lround(options.image_scale * longest_side_px)));
   }
-  return own.dump();
+  return JsonText(own);
 }
 
 }  // namespace meshwright

@@ -11,6 +11,7 @@
 
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
+#include "common/json/json_text.h"
 #include "common/json/parse_json.h"
 #include "common/mesh/formats/mesh_format.h"
 #include "coordinator/nodeodm/odm_cameras.h"
@@ -135,7 +136,7 @@ class Maker {
       MW_ASSIGN_OR_RETURN(const ZipEntry entry, MakeZipEntry(name, path));
       manifest.push_back({{"name", name}, {"size_bytes", entry.size_bytes}, {"crc32", entry.crc32}});
     }
-    return WriteFileAtomically((fs::path(folder_) / kManifest).string(), manifest.dump());
+    return WriteFileAtomically((fs::path(folder_) / kManifest).string(), JsonText(manifest));
   }
 
   const OdmTask& task_;

@@ -14,6 +14,7 @@
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
 #include "common/image/decode.h"
+#include "common/json/json_text.h"
 #include "coordinator/nodeodm/odm_files.h"
 
 namespace meshwright {
@@ -335,7 +336,7 @@ absl::Status TaskBoard::Again(const OdmTask& from, OdmTask& to, const OdmTaskOpt
 absl::Status TaskBoard::Restart(const std::string& uuid, const std::optional<std::string>& given) {
   MW_ASSIGN_OR_RETURN(const OdmTask task, Get(uuid));
   if (!HasEnded(task)) return absl::FailedPreconditionError("Task cannot be restarted: it is queued or running");
-  MW_ASSIGN_OR_RETURN(const OdmTaskOptions options, services_.options->Parse(given.value_or(task.options.dump())));
+  MW_ASSIGN_OR_RETURN(const OdmTaskOptions options, services_.options->Parse(given.value_or(JsonText(task.options))));
   OdmTask next = task;
   MW_RETURN_IF_ERROR(Again(task, next, options));
   std::error_code error;
@@ -440,7 +441,7 @@ absl::Status TaskBoard::StartRun(const OdmTask& task) {
   const bool has_cameras = std::any_of(
       files.begin(), files.end(), [](const SceneFile& file) { return KindOfFile(file.path) == OdmFileKind::kCameras; });
   if (!has_cameras) return absl::FailedPreconditionError(kCamerasNeeded);
-  MW_ASSIGN_OR_RETURN(const OdmTaskOptions options, services_.options->Parse(task.options.dump()));
+  MW_ASSIGN_OR_RETURN(const OdmTaskOptions options, services_.options->Parse(JsonText(task.options)));
   OdmTask run = task;
   // How large the photographs are was not known when the task began.
   if (run.run == 0 && options.image_scale < 1) {
@@ -519,7 +520,7 @@ void TaskBoard::Pack() {
 }
 
 void TaskBoard::PackOne(const OdmTask& task) {
-  const auto options = services_.options->Parse(task.options.dump());
+  const auto options = services_.options->Parse(JsonText(task.options));
   const bool skips_model = options.ok() && options->skips_model;
   Update(task.uuid, [&](OdmTask&, std::vector<std::string>& lines) {
     lines.emplace_back(skips_model ? "Packing the result" : "Cutting the texture and packing the result");
