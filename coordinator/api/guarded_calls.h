@@ -14,6 +14,10 @@ namespace meshwright {
 // The caller's own, if that is within the quota of reconstructions.
 absl::StatusOr<v1::Reconstruction> CreateFor(const Caller& caller, Gatekeeper& gate, ReconstructionService& service,
                                              const v1::CreateReconstructionRequest& request);
+// The same of the scene of `source`, which the caller may change.
+absl::StatusOr<v1::Reconstruction> CreateAgainFor(const Caller& caller, Gatekeeper& gate,
+                                                  ReconstructionService& service, const std::string& source,
+                                                  const v1::CreateReconstructionRequest& request);
 // Those that the caller may see.
 absl::StatusOr<v1::ListReconstructionsResponse> ListFor(const Caller& caller, const ReconstructionService& service,
                                                         const v1::ListReconstructionsRequest& request);

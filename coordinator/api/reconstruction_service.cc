@@ -263,10 +263,14 @@ absl::Status ReconstructionService::CheckTakesFiles(const std::string& id) const
 }
 
 absl::StatusOr<v1::Reconstruction> ReconstructionService::CreateAgain(const std::string& source,
-                                                                      v1::CreateReconstructionRequest request) {
+                                                                      v1::CreateReconstructionRequest request,
+                                                                      const std::string& owner) {
   MW_ASSIGN_OR_RETURN(const Reconstruction from, Find(source));
+  if (!request.scene_reference().empty()) {
+    return absl::InvalidArgumentError("scene_reference is given, expected none: the scene is that of the other one");
+  }
   request.set_scene_reference(from.scene_reference);
-  MW_ASSIGN_OR_RETURN(v1::Reconstruction created, Create(request));
+  MW_ASSIGN_OR_RETURN(v1::Reconstruction created, Create(request, owner));
   if (created.state() != v1::RECONSTRUCTION_STATE_CREATED) return created;
   MW_ASSIGN_OR_RETURN(const std::vector<SceneFile> files, environment_.store->ListSceneFiles(source));
   ReferencedBlobs blobs(created.id(), *environment_.store, *environment_.blobs);

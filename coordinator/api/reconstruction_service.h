@@ -50,8 +50,10 @@ class ReconstructionService {
   absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request,
                                             const std::string& owner = "");
   // Creates one of the files that were uploaded for `source`, whatever has become of that, or of the same
-  // scene_reference: with other options nothing has to be sent again. Repeating it is harmless.
-  absl::StatusOr<v1::Reconstruction> CreateAgain(const std::string& source, v1::CreateReconstructionRequest request);
+  // scene_reference, so that `request` names none: with other options nothing has to be sent again. Repeating it is
+  // harmless.
+  absl::StatusOr<v1::Reconstruction> CreateAgain(const std::string& source, v1::CreateReconstructionRequest request,
+                                                 const std::string& owner = "");
   absl::StatusOr<SceneFileUpload> BeginUpload(const v1::UploadSceneFileRequest::Header& header);
   // The same for a file that has come otherwise and lies, synced and with the digest that it should have, in
   // staging_folder(), or elsewhere where it has to be copied. It is gone when this returns OK.

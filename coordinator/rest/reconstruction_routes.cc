@@ -1,3 +1,6 @@
+#include <functional>
+#include <memory>
+#include <string>
 #include <utility>
 
 #include <absl/strings/match.h>
@@ -26,7 +29,11 @@ absl::Status Answer(RestCall& call, const absl::StatusOr<v1::Reconstruction>& re
   return absl::OkStatus();
 }
 
-absl::Status Create(const RestContext& context, RestCall& call) {
+// Reads the body, hands it to `create` and answers with what that gives.
+absl::Status TakeCreateRequest(RestCall& call,
+                               std::function<absl::StatusOr<v1::Reconstruction>(
+                                   const Caller& caller, const v1::CreateReconstructionRequest& request)>
+                                   create) {
   const std::string type = call.request.headers.Get("Content-Type");
   if (!absl::StartsWithIgnoreCase(type, kJsonType)) {
     return HttpError(415, FieldError("Content-Type",
@@ -40,11 +47,24 @@ absl::Status Create(const RestContext& context, RestCall& call) {
         body->append(bytes.begin(), bytes.end());
         return absl::OkStatus();
       },
-      [&context, body](RestCall& taken) -> absl::Status {
+      [create = std::move(create), body](RestCall& taken) -> absl::Status {
         v1::CreateReconstructionRequest request;
         MW_RETURN_IF_ERROR(FromJson(*body, request));
-        return Answer(taken, CreateFor(taken.caller, *context.gate, *context.reconstructions, request));
+        return Answer(taken, create(taken.caller, request));
       });
+}
+
+absl::Status Create(const RestContext& context, RestCall& call) {
+  return TakeCreateRequest(call, [&context](const Caller& caller, const v1::CreateReconstructionRequest& request) {
+    return CreateFor(caller, *context.gate, *context.reconstructions, request);
+  });
+}
+
+absl::Status Again(const RestContext& context, RestCall& call) {
+  return TakeCreateRequest(call, [&context, source = call.path.at("id")](
+                                     const Caller& caller, const v1::CreateReconstructionRequest& request) {
+    return CreateAgainFor(caller, *context.gate, *context.reconstructions, source, request);
+  });
 }
 
 absl::Status List(const RestContext& context, RestCall& call) {
@@ -138,6 +158,7 @@ void AddReconstructionRoutes(const RestContext& context, std::vector<Route>& rou
   add("GET", "/v1/reconstructions", {"pageSize", "pageToken"}, List);
   add("POST", "/v1/reconstructions", {}, Create);
   add("POST", "/v1/reconstructions/{id}:start", {}, Start);
+  add("POST", "/v1/reconstructions/{id}:again", {}, Again);
   add("POST", "/v1/reconstructions/{id}:cancel", {}, [](const RestContext& to, RestCall& call) {
     return Answer(call, to.reconstructions->Cancel(call.path.at("id")));
   });

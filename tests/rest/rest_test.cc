@@ -144,6 +144,14 @@ TEST_F(RestTest, FromAnInterruptedUploadToTheMesh) {
     EXPECT_EQ(converted->body == mesh->body, format["name"] == "ply");
   }
 
+  // Again with other options, of the same files.
+  const auto again = PostJson(base + ":again", R"({"id":"c8","optionsJson":"{\"lattice-step\":4}"})");
+  ASSERT_EQ(again->status, 200) << again->body;
+  EXPECT_EQ(Json::parse(again->body)["state"], "RECONSTRUCTION_STATE_CREATED");
+  EXPECT_EQ(GetJson("/v1/reconstructions/c8/files")["files"].size(), SceneFiles().size());
+  EXPECT_EQ(PostJson("/v1/reconstructions/nowhere:again", R"({"id":"c9"})")->status, 404);
+  EXPECT_EQ(PostJson(base + ":again", R"({"id":"c9","sceneReference":"file:x"})")->status, 400);
+
   // One part: as PLY with all of its faces, and as a preview with few.
   const std::string part = absl::StrCat(base, "/parts/", parts[0]["sequence"].get<int>());
   const auto ply = ParsePly(http_->Get(part)->body, "part");

@@ -13,7 +13,7 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Tuple, Union
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple, Union
 
 from .errors import (
     FormatError,
@@ -69,6 +69,17 @@ class Reconstruction:
     def start(self) -> None:
         """No more files; processing begins. Repeating it is harmless."""
         self._transport.json("POST", self._path + ":start")
+
+    def again(
+        self, options: Optional[Mapping[str, Any]] = None, *, id: Optional[str] = None, start: bool = True
+    ) -> "Reconstruction":
+        """Another one of the same scene with other options; nothing is sent again."""
+        request = {"id": id or f"{self.id[:57]}-{secrets.token_hex(3)}", "optionsJson": json.dumps(dict(options or {}))}
+        created = self._transport.json("POST", self._path + ":again", request)
+        other = Reconstruction(self._transport, created["id"])
+        if start:
+            other.start()
+        return other
 
     def cancel(self) -> None:
         """Stops it. What is over stays as it is."""

@@ -54,6 +54,12 @@ class ServiceTest(unittest.TestCase):
         self.assertEqual((self.service.folder / "mesh.glb").read_bytes()[:4], b"glTF")
         self.look_at_surfaces(reconstruction)
 
+        other = reconstruction.again({**service.OPTIONS, "lattice-step": 4}).wait(60)
+        faces = [int(one.describe()["progress"]["faces"]) for one in (other, reconstruction)]
+        self.assertLess(faces[0], faces[1])
+        self.assertEqual([camera["name"] for camera in other.cameras()], [camera["name"] for camera in reconstruction.cameras()])
+        other.delete()
+
         self.assertIn(reconstruction.id, [item["id"] for item in self.client.list()])
         self.assertEqual([worker["id"] for worker in self.client.workers()], ["local-1"])
         self.assertTrue(reconstruction.attempts())
