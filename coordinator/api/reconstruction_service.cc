@@ -90,9 +90,9 @@ ReconstructionService::~ReconstructionService() {
   for (auto& [id, conducted] : conducted_) conducted->RequestStop();
   const absl::Time now = environment_.store->Now().value_or(environment_.clock->Now());
   for (auto& [id, conducted] : conducted_) {
-    const int64_t epoch = conducted->epoch();
+    HeldConductorLease lease = conducted->lease();
     conducted.reset();
-    environment_.store->ReleaseConductorLease(id, epoch, now).IgnoreError();
+    lease.Release(now).IgnoreError();
   }
 }
 
@@ -131,7 +131,7 @@ absl::Status ReconstructionService::OverseeOnce() {
     for (auto it = conducted_.begin(); it != conducted_.end();) {
       ReconstructionDriver& conducted = *it->second;
       const auto found = by_id.find(it->first);
-      const bool is_ours = found != by_id.end() && found->second->lease.epoch == conducted.epoch();
+      const bool is_ours = found != by_id.end() && found->second->lease.epoch == conducted.lease().epoch();
       if (!is_ours) conducted.RequestStop();  // cancelled, or somebody else's now
       if (conducted.has_ended()) {
         ended.push_back(std::move(it->second));
@@ -149,6 +149,7 @@ absl::Status ReconstructionService::OverseeOnce() {
 }
 
 absl::Status ReconstructionService::TakeUp(const ConductedState& state, absl::Time now) {
+  HeldConductorLease* held = nullptr;  // touched by this thread alone, as is what owns it
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto found = conducted_.find(state.id);
@@ -156,27 +157,23 @@ absl::Status ReconstructionService::TakeUp(const ConductedState& state, absl::Ti
       ReconstructionDriver& conducted = *found->second;
       // What was run before it was deleted has to end first.
       if (state.state == ReconstructionState::kDeleting && !conducted.is_deleting()) conducted.RequestStop();
-      const bool is_ours = state.lease.epoch == conducted.epoch();
-      if (!is_ours || state.lease.expires_at - now > options_.conductor_lease / 2) return absl::OkStatus();
-    } else if (state.lease.epoch > 0 && state.lease.expires_at > now && state.lease.owner != options_.name) {
-      return absl::OkStatus();
+      held = &conducted.lease();
     }
   }
-  const absl::Time until = now + options_.conductor_lease;
-  const auto is_conducted = [&] {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return conducted_.count(state.id) > 0;
-  };
-  if (is_conducted()) {
-    const absl::Status renewed = environment_.store->RenewConductorLease(state.id, state.lease.epoch, until, now);
+  if (held != nullptr) {
+    const absl::Status renewed = held->RenewIfDue(now);
     return absl::IsAborted(renewed) ? absl::OkStatus() : renewed;
   }
-  const absl::StatusOr<int64_t> epoch = environment_.store->AcquireConductorLease(state.id, options_.name, until, now);
+  if (state.lease.epoch > 0 && state.lease.expires_at > now && state.lease.owner != options_.name) {
+    return absl::OkStatus();
+  }
+  absl::StatusOr<HeldConductorLease> lease =
+      HeldConductorLease::Acquire(*environment_.store, state.id, options_.name, options_.conductor_lease, now);
   // Another coordinator was quicker, or it is gone.
-  if (absl::IsFailedPrecondition(epoch.status()) || absl::IsNotFound(epoch.status())) return absl::OkStatus();
-  MW_RETURN_IF_ERROR(epoch.status());
+  if (absl::IsFailedPrecondition(lease.status()) || absl::IsNotFound(lease.status())) return absl::OkStatus();
+  MW_RETURN_IF_ERROR(lease.status());
   const std::lock_guard<std::mutex> lock(mutex_);
-  conducted_[state.id] = std::make_unique<ReconstructionDriver>(environment_, folders_, state.id, *epoch,
+  conducted_[state.id] = std::make_unique<ReconstructionDriver>(environment_, folders_, state.id, *std::move(lease),
                                                                 state.state == ReconstructionState::kDeleting,
                                                                 [this](bool has_ended) { Changed(has_ended); });
   return absl::OkStatus();
@@ -313,7 +310,7 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Start(const std::strin
   MW_ASSIGN_OR_RETURN(Reconstruction stored, Find(id));
   if (stored.state == ReconstructionState::kCreated) {
     MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
-    MW_RETURN_IF_ERROR(environment_.store->SetReconstructionState(id, ReconstructionState::kPreparing, now));
+    MW_RETURN_IF_ERROR(environment_.store->RequestState(id, ReconstructionState::kPreparing, now));
     Changed(/*look=*/true);
     MW_ASSIGN_OR_RETURN(stored, Find(id));
   }
@@ -356,7 +353,7 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Cancel(const std::stri
   MW_ASSIGN_OR_RETURN(Reconstruction stored, Find(id));
   if (!IsFinal(stored.state)) {
     MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
-    const absl::Status cancelled = environment_.store->SetReconstructionState(id, ReconstructionState::kCancelled, now);
+    const absl::Status cancelled = environment_.store->RequestState(id, ReconstructionState::kCancelled, now);
     // It may have come to its end at the same moment.
     if (!absl::IsFailedPrecondition(cancelled)) MW_RETURN_IF_ERROR(cancelled);
     const bool was_conducted = stored.state != ReconstructionState::kCreated;

@@ -43,7 +43,7 @@ void KeepLargest(int count, std::vector<Surface>& surfaces) {
 
 Conductor::Conductor(std::string reconstruction_id, const std::vector<Camera>& cameras, FeasiblePairs pairs,
                      OverlapGraph overlaps, const ConductorOptions& options, JobStore* store, BlobStore* blobs,
-                     const Clock* clock, ThreadPool* pool, ConductorLeaseTerms terms)
+                     const Clock* clock, ThreadPool* pool, int64_t epoch, JobBytes job_bytes)
     : reconstruction_id_(std::move(reconstruction_id)),
       cameras_(CameraGeometries(cameras)),
       probes_(std::move(pairs.probes)),
@@ -55,7 +55,8 @@ Conductor::Conductor(std::string reconstruction_id, const std::vector<Camera>& c
       blobs_(blobs),
       clock_(clock),
       pool_(pool),
-      terms_(std::move(terms)),
+      epoch_(epoch),
+      job_bytes_(std::move(job_bytes)),
       schedule_(std::move(pairs.matrix), overlaps_,
                 ScheduleOptions{.window = options.window, .max_overlap_in_flight = options.acceptance.k_a}) {}
 
@@ -64,17 +65,17 @@ absl::StatusOr<std::unique_ptr<Conductor>> Conductor::Open(const std::string& re
                                                            const std::vector<SparsePoint>& points,
                                                            const ConductorOptions& options, JobStore* store,
                                                            BlobStore* blobs, const Clock* clock, ThreadPool* pool,
-                                                           ConductorLeaseTerms terms) {
+                                                           int64_t epoch, JobBytes job_bytes) {
   MW_RETURN_IF_ERROR(options.Validate());
   MW_RETURN_IF_ERROR(store->GetReconstruction(reconstruction_id).status());
   MW_ASSIGN_OR_RETURN(FeasiblePairs pairs, FindFeasiblePairs(cameras, points, options.pairs, *pool));
   OverlapGraph overlaps = FindOverlaps(CameraGeometries(cameras), pairs.probes, pairs.matrix, options.overlap, *pool);
   auto conductor =
       std::unique_ptr<Conductor>(new Conductor(reconstruction_id, cameras, std::move(pairs), std::move(overlaps),
-                                               options, store, blobs, clock, pool, std::move(terms)));
+                                               options, store, blobs, clock, pool, epoch, std::move(job_bytes)));
   MW_ASSIGN_OR_RETURN(const std::vector<CameraJob> jobs, store->ListCameraJobs(reconstruction_id));
   MW_ASSIGN_OR_RETURN(const std::vector<Commit> commits, store->ListCommits(reconstruction_id));
-  const std::lock_guard<std::mutex> lock(conductor->mutex_);
+  const MutexLock lock(conductor->mutex_);
   MW_RETURN_IF_ERROR(conductor->Replay(jobs, commits));
   return conductor;
 }
@@ -89,11 +90,11 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
                                               ") is not what this scene and these options give"));
     }
     const bool is_made_again = !jobs[i].expected_digest.empty();
-    const Outcome outcome = {.filtered_digest = is_made_again ? jobs[i].expected_digest : jobs[i].filtered_digest,
-                             .weak_targets = jobs[i].weak_targets,
-                             .skipped = jobs[i].state == CameraJobState::kSkipped};
-    MW_RETURN_IF_ERROR(schedule_.Commit(RecordFor(schedule_.in_flight().front(), outcome)));
-    Remember(commit, outcome);
+    const JobResult result = {.skipped = jobs[i].state == CameraJobState::kSkipped,
+                              .filtered_digest = is_made_again ? jobs[i].expected_digest : jobs[i].filtered_digest,
+                              .weak_targets = jobs[i].weak_targets};
+    MW_RETURN_IF_ERROR(schedule_.Commit(OutcomeOf(schedule_.in_flight().front(), result)));
+    Remember(commit, result);
   }
   for (const Assignment& assignment : schedule_.TakeChoices()) {
     const auto index = static_cast<size_t>(assignment.sequence) - 1;
@@ -106,135 +107,100 @@ absl::Status Conductor::Replay(const std::vector<CameraJob>& jobs, const std::ve
       return absl::DataLossError(
           absl::StrCat(Name(job.sequence), " (camera ", job.camera, ") is not what this scene and these options give"));
     }
-    if (job.state == CameraJobState::kAssigned && terms_.epoch > 0) continue;  // it is in the store, or at a worker
-    if (job.state == CameraJobState::kAssigned) {
-      MW_ASSIGN_OR_RETURN(const int64_t epoch,
-                          store_->ReassignCameraJob(reconstruction_id_, job.sequence, clock_->Now()));
-      ready_.push_back(SpecFor(assignment, epoch));
-    } else {
-      finished_[job.sequence] = {.filtered_digest = job.filtered_digest,
-                                 .weak_targets = job.weak_targets,
-                                 .skipped = job.state == CameraJobState::kSkipped,
-                                 .epoch = job.epoch};
-    }
   }
-  return CommitWhatIsNext();
+  // What is assigned waits in the store, or is at a worker; what is done is what IngestResults() finds.
+  return Flush();
 }
 
 void Conductor::Assign(const Assignment& assignment) {
-  CameraJobSpec spec = SpecFor(assignment, 1);
-  const std::vector<int64_t> bytes = terms_.job_bytes ? terms_.job_bytes(spec) : std::vector<int64_t>();
-  unwritten_assignments_.push_back(
-      {.sequence = spec.sequence,
-       .camera = spec.camera,
-       .snapshot = spec.snapshot,
-       .memory_bytes = bytes.empty() ? 0 : bytes.front(),
-       .neighbours = spec.neighbours,
-       .spec = EncodeJobSpec({.targets = spec.targets, .accepted = spec.accepted, .memory_bytes = bytes})});
-  if (terms_.epoch == 0) ready_.push_back(std::move(spec));
+  CameraJobSpec spec = SpecFor(assignment);
+  std::vector<int64_t> bytes = job_bytes_(spec);
+  unwritten_assignments_.push_back({.sequence = spec.sequence,
+                                    .camera = spec.camera,
+                                    .snapshot = spec.snapshot,
+                                    .memory_bytes = bytes.front(),
+                                    .neighbours = std::move(spec.neighbours),
+                                    .spec = EncodeJobSpec({.targets = std::move(spec.targets),
+                                                           .accepted = std::move(spec.accepted),
+                                                           .memory_bytes = std::move(bytes)})});
 }
 
 absl::Status Conductor::Flush() {
   if (unwritten_commits_.empty() && unwritten_assignments_.empty()) return absl::OkStatus();
-  const Progress now = CurrentProgress();
-  const StoredProgress stored = {.cameras_total = now.cameras_total,
-                                 .cameras_committed = now.cameras_committed,
-                                 .cameras_skipped = now.cameras_skipped,
-                                 .cameras_in_flight = now.cameras_in_flight,
-                                 .patches_filtered = now.patches_filtered,
-                                 .patches_accepted = now.patches_accepted};
-  MW_RETURN_IF_ERROR(store_->Advance(reconstruction_id_, unwritten_commits_, unwritten_assignments_, stored,
-                                     clock_->Now(), terms_.epoch));
+  MW_RETURN_IF_ERROR(store_->Advance(reconstruction_id_, unwritten_commits_, unwritten_assignments_, CurrentProgress(),
+                                     clock_->Now(), epoch_));
   unwritten_commits_.clear();
   unwritten_assignments_.clear();
   return absl::OkStatus();
 }
 
-std::vector<CameraJobSpec> Conductor::TakeJobs() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return std::exchange(ready_, {});
-}
-
-absl::Status Conductor::Complete(SequenceNumber sequence, int64_t epoch, const std::string& filtered_digest,
-                                 const std::vector<CameraIndex>& weak_targets, const std::string& report_json) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (sequence <= schedule_.commits()) return absl::OkStatus();
-  MW_ASSIGN_OR_RETURN(const Assignment* const assignment, FindInFlight(sequence));
-  MW_RETURN_IF_ERROR(CheckWeakTargets(*assignment, weak_targets));
-  MW_ASSIGN_OR_RETURN(const bool durable, blobs_->Has(filtered_digest));
-  if (!durable) {
-    return absl::FailedPreconditionError(
-        absl::StrCat(Name(sequence), ": its surface ", filtered_digest, " is not in the blob store"));
-  }
-  MW_RETURN_IF_ERROR(store_->CompleteCameraJob(reconstruction_id_, sequence, epoch, filtered_digest, weak_targets,
-                                               report_json, clock_->Now()));
-  finished_[sequence] = {.filtered_digest = filtered_digest, .weak_targets = weak_targets, .epoch = epoch};
-  return CommitWhatIsNext();
-}
-
-absl::Status Conductor::Skip(SequenceNumber sequence, int64_t epoch, const std::string& reason) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (sequence <= schedule_.commits()) return absl::OkStatus();
-  MW_RETURN_IF_ERROR(FindInFlight(sequence).status());
-  MW_RETURN_IF_ERROR(store_->SkipCameraJob(reconstruction_id_, sequence, epoch, reason, clock_->Now()));
-  finished_[sequence] = {.skipped = true, .epoch = epoch};
-  return CommitWhatIsNext();
-}
-
 absl::StatusOr<bool> Conductor::IngestResults(int max_failures) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   damaged_blob_.clear();
   MW_ASSIGN_OR_RETURN(const std::vector<JobResult> results,
                       store_->ListResults(reconstruction_id_, schedule_.commits()));
-  for (const JobResult& result : results) {
-    const auto known = finished_.find(result.sequence);
-    if (known != finished_.end() && known->second.epoch == result.epoch) continue;
-    MW_ASSIGN_OR_RETURN(const Assignment* const assignment, FindInFlight(result.sequence));
-    const absl::Status valid = CheckWeakTargets(*assignment, result.weak_targets);
-    bool durable = true;
-    if (valid.ok() && !result.skipped) {
-      MW_ASSIGN_OR_RETURN(durable, blobs_->Has(result.filtered_digest));
-    }
-    if (!valid.ok() || !durable) {
-      const std::string reason = valid.ok() ? absl::StrCat("its surface ", result.filtered_digest, " is not there")
-                                            : std::string(valid.message());
-      MW_RETURN_IF_ERROR(Reject(result.sequence, result.epoch, reason, max_failures));
-      continue;
-    }
-    finished_[result.sequence] = {.filtered_digest = result.filtered_digest,
-                                  .weak_targets = result.weak_targets,
-                                  .skipped = result.skipped,
-                                  .epoch = result.epoch};
-  }
-  const SequenceNumber in_flight_before = schedule_.commits() + static_cast<int>(schedule_.in_flight().size());
+  for (const JobResult& result : results) MW_RETURN_IF_ERROR(Receive(result, max_failures));
+  const SequenceNumber before = LastChoice();
   const absl::Status status = CommitWhatIsNext();
   if (absl::IsInvalidArgument(status) && !schedule_.in_flight().empty()) {
     // The next in line is no surface.
-    const SequenceNumber sequence = schedule_.in_flight().front().sequence;
-    const int64_t epoch = finished_.at(sequence).epoch;
-    finished_.erase(sequence);
-    MW_RETURN_IF_ERROR(Reject(sequence, epoch, std::string(status.message()), max_failures));
+    const auto found = finished_.find(schedule_.in_flight().front().sequence);
+    const JobResult result = found->second;
+    finished_.erase(found);
+    MW_RETURN_IF_ERROR(Reject(result, std::string(status.message()), max_failures));
   } else {
     MW_RETURN_IF_ERROR(status);
   }
-  return schedule_.commits() + static_cast<int>(schedule_.in_flight().size()) > in_flight_before;
+  return LastChoice() > before;
 }
 
-absl::Status Conductor::Reject(SequenceNumber sequence, int64_t epoch, const std::string& reason, int max_failures) {
+SequenceNumber Conductor::LastChoice() const {
+  return schedule_.commits() + static_cast<SequenceNumber>(schedule_.in_flight().size());
+}
+
+absl::Status Conductor::Receive(const JobResult& result, int max_failures) {
+  const auto known = finished_.find(result.sequence);
+  if (known != finished_.end() && known->second.epoch == result.epoch) return absl::OkStatus();
+  MW_ASSIGN_OR_RETURN(const Assignment* const assignment, FindInFlight(result.sequence));
+  if (!result.skipped) {
+    const absl::Status valid = CheckWeakTargets(*assignment, result.weak_targets);
+    if (!valid.ok()) return Reject(result, std::string(valid.message()), max_failures);
+    MW_ASSIGN_OR_RETURN(const bool durable, blobs_->Has(result.filtered_digest));
+    if (!durable) {
+      return Reject(result, absl::StrCat("its surface ", result.filtered_digest, " is not there"), max_failures);
+    }
+  }
+  finished_[result.sequence] = result;
+  return absl::OkStatus();
+}
+
+absl::Status Conductor::Reject(const JobResult& result, const std::string& reason, int max_failures) {
   MW_RETURN_IF_ERROR(
-      store_->ReopenCameraJob(reconstruction_id_, sequence, epoch, "", reason, clock_->Now(), terms_.epoch));
-  MW_ASSIGN_OR_RETURN(const CameraJob job, store_->GetCameraJob(reconstruction_id_, sequence));
+      store_->ReopenCameraJob(reconstruction_id_, result.sequence, result.epoch, "", reason, clock_->Now(), epoch_));
+  MW_ASSIGN_OR_RETURN(const CameraJob job, store_->GetCameraJob(reconstruction_id_, result.sequence));
   if (job.failed_attempts < max_failures) return absl::OkStatus();
-  return store_->SkipCameraJob(reconstruction_id_, sequence, job.epoch, reason, clock_->Now());
+  const JobChange skip = {.kind = JobChange::Kind::kSkipped,
+                          .id = reconstruction_id_,
+                          .sequence = result.sequence,
+                          .epoch = job.epoch,
+                          .reason = reason};
+  // Refused when a worker has just claimed it: it gets one attempt more.
+  return store_->ApplyChanges({skip}, {}, clock_->Now()).status();
 }
 
 std::string Conductor::damaged_blob() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return damaged_blob_;
 }
 
+bool Conductor::HasAccepted(const std::string& accepted_digest) const {
+  const MutexLock lock(mutex_);
+  return std::any_of(committed_.begin(), committed_.end(),
+                     [&](const auto& one) { return one.second.accepted.digest == accepted_digest; });
+}
+
 absl::Status Conductor::RemakeAccepted(const std::string& accepted_digest) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   damaged_blob_.clear();
   for (const auto& [camera, committed] : committed_) {
     if (committed.accepted.digest != accepted_digest) continue;
@@ -248,7 +214,7 @@ absl::Status Conductor::RemakeAccepted(const std::string& accepted_digest) {
 }
 
 SequenceNumber Conductor::JobOfFiltered(const std::string& filtered_digest) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [camera, committed] : committed_) {
     if (committed.filtered_digest == filtered_digest) return committed.sequence;
   }
@@ -272,17 +238,17 @@ absl::Status Conductor::CommitWhatIsNext() {
     const Assignment assignment = schedule_.in_flight().front();
     const auto found = finished_.find(assignment.sequence);
     if (found == finished_.end()) break;
-    const Outcome& outcome = found->second;
+    const JobResult& result = found->second;
     Commit commit = {.sequence = assignment.sequence, .camera = assignment.camera};
-    if (!outcome.skipped) {
-      absl::StatusOr<Commit> accepted = Accept(assignment.sequence, assignment.camera, outcome.filtered_digest);
+    if (!result.skipped) {
+      absl::StatusOr<Commit> accepted = Accept(assignment.sequence, assignment.camera, result.filtered_digest);
       status = accepted.status();
       if (!status.ok()) break;
       commit = *std::move(accepted);
     }
     unwritten_commits_.push_back(commit);
-    MW_RETURN_IF_ERROR(schedule_.Commit(RecordFor(assignment, outcome)));
-    Remember(commit, outcome);
+    MW_RETURN_IF_ERROR(schedule_.Commit(OutcomeOf(assignment, result)));
+    Remember(commit, result);
     finished_.erase(found);
     for (const Assignment& choice : schedule_.TakeChoices()) Assign(choice);
     if (clock_->Now() - written < kWriteEvery) continue;
@@ -290,10 +256,7 @@ absl::Status Conductor::CommitWhatIsNext() {
     written = clock_->Now();
   }
   MW_RETURN_IF_ERROR(Flush());
-  MW_RETURN_IF_ERROR(status);
-  // With an terms there is more to come than cameras: the mesh.
-  if (!schedule_.finished() || terms_.epoch > 0) return absl::OkStatus();
-  return store_->SetReconstructionState(reconstruction_id_, ReconstructionState::kDone, clock_->Now());
+  return status;
 }
 
 absl::StatusOr<std::shared_ptr<const SparseSurface>> Conductor::LoadSurface(const std::string& digest,
@@ -302,12 +265,10 @@ absl::StatusOr<std::shared_ptr<const SparseSurface>> Conductor::LoadSurface(cons
   if (absl::IsDataLoss(bytes.status()) || absl::IsNotFound(bytes.status())) damaged_blob_ = digest;
   MW_RETURN_IF_ERROR(bytes.status());
   absl::StatusOr<SparseSurface> surface = DecodeSparseSurface(*bytes);
-  const bool from_worker = terms_.epoch > 0;
-  if (!surface.ok() || surface->camera_index != expected_camera) {
-    const std::string message = surface.ok() ? absl::StrCat("surface ", digest, " is of camera ", surface->camera_index,
-                                                            ", expected camera ", expected_camera)
-                                             : std::string(surface.status().message());
-    return from_worker ? absl::InvalidArgumentError(message) : absl::DataLossError(message);
+  if (!surface.ok()) return absl::InvalidArgumentError(surface.status().message());
+  if (surface->camera_index != expected_camera) {
+    return absl::InvalidArgumentError(absl::StrCat("surface ", digest, " is of camera ", surface->camera_index,
+                                                   ", expected camera ", expected_camera));
   }
   return std::make_shared<const SparseSurface>(*std::move(surface));
 }
@@ -330,7 +291,7 @@ absl::StatusOr<Commit> Conductor::Accept(SequenceNumber sequence, CameraIndex ca
     supporters.push_back({other, found->second.filtered_digest, found->second.filtered_patches});
   }
   KeepLargest(options_.max_surfaces, supporters);
-  const auto load = [&](int i) {
+  const auto load = [&](int i) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     const Supporter& supporter = supporters[static_cast<size_t>(i)];
     return LoadSurface(supporter.digest, supporter.camera);
   };
@@ -347,33 +308,32 @@ absl::StatusOr<Commit> Conductor::Accept(SequenceNumber sequence, CameraIndex ca
   return commit;
 }
 
-void Conductor::Remember(const Commit& commit, const Outcome& outcome) {
+void Conductor::Remember(const Commit& commit, const JobResult& result) {
   committed_[commit.camera] = {.sequence = commit.sequence,
-                               .filtered_digest = commit.filtered_patches > 0 ? outcome.filtered_digest : std::string(),
+                               .filtered_digest = commit.filtered_patches > 0 ? result.filtered_digest : std::string(),
                                .filtered_patches = commit.filtered_patches,
                                .accepted = {.sequence = commit.sequence,
                                             .camera = commit.camera,
                                             .digest = commit.accepted_digest,
                                             .patches = commit.accepted_patches}};
-  if (outcome.skipped) ++progress_.cameras_skipped;
+  if (result.skipped) ++progress_.cameras_skipped;
   progress_.patches_filtered += commit.filtered_patches;
   progress_.patches_accepted += commit.accepted_patches;
 }
 
-CommitRecord Conductor::RecordFor(const Assignment& assignment, const Outcome& outcome) const {
+JobOutcome Conductor::OutcomeOf(const Assignment& assignment, const JobResult& result) const {
   // Nobody can use the image of a camera that was skipped: all its pairs go.
   return {.sequence = assignment.sequence,
           .camera = assignment.camera,
-          .weak_targets = outcome.skipped ? schedule_.matrix().Neighbours(assignment.camera) : outcome.weak_targets,
-          .skipped = outcome.skipped};
+          .weak_targets = result.skipped ? schedule_.matrix().Neighbours(assignment.camera) : result.weak_targets,
+          .skipped = result.skipped};
 }
 
-CameraJobSpec Conductor::SpecFor(const Assignment& assignment, int64_t epoch) const {
+CameraJobSpec Conductor::SpecFor(const Assignment& assignment) const {
   CameraJobSpec spec = {
       .sequence = assignment.sequence,
       .camera = assignment.camera,
       .snapshot = assignment.snapshot,
-      .epoch = epoch,
       .neighbours = assignment.neighbours,
       .targets = ChooseTargets(assignment.camera, assignment.neighbours, cameras_, probes_, options_.targets)};
   for (const CameraIndex other : overlaps_.Of(assignment.camera)) {
@@ -385,25 +345,25 @@ CameraJobSpec Conductor::SpecFor(const Assignment& assignment, int64_t epoch) co
 }
 
 Progress Conductor::progress() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return CurrentProgress();
 }
 
 Progress Conductor::CurrentProgress() const {
   Progress progress = progress_;
   progress.cameras_committed = schedule_.commits();
-  progress.cameras_in_flight = static_cast<int>(schedule_.in_flight().size());
+  progress.cameras_in_flight = static_cast<int64_t>(schedule_.in_flight().size());
   progress.cameras_total = progress.cameras_committed + progress.cameras_in_flight + schedule_.waiting_cameras();
   return progress;
 }
 
 bool Conductor::finished() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return schedule_.finished();
 }
 
 std::vector<AcceptedSurface> Conductor::AcceptedSurfaces() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<AcceptedSurface> surfaces;
   for (const auto& [camera, committed] : committed_) {
     if (committed.accepted.patches > 0) surfaces.push_back(committed.accepted);

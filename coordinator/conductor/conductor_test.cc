@@ -11,7 +11,9 @@
 
 #include "common/base/check.h"
 #include "common/blob/filesystem_blob_store.h"
+#include "common/job/job_spec_codec.h"
 #include "common/surface/codec.h"
+#include "coordinator/conductor/outer_loop.h"
 #include "coordinator/store/sqlite_job_store.h"
 
 namespace meshwright {
@@ -75,58 +77,112 @@ class ConductorTest : public testing::Test {
 
   // A fresh store and its blobs.
   void StartAnew(const std::string& name, const ConductorOptions& options) {
-    conductor_.reset();
+    loop_.reset();
     options_ = options;
     store_path_ = absl::StrCat(folder_, "/", name, ".sqlite");
     blobs_ = *FilesystemBlobStore::Open(absl::StrCat(folder_, "/", name));
     store_ = *OpenSqliteJobStore(store_path_);
     ASSERT_TRUE(store_->CreateReconstruction({"wall", "{}", std::string(64, '0')}, clock_.Now()).ok());
-    OpenConductor();
+    OpenLoop();
   }
 
-  void OpenConductor() {
-    conductor_.reset();
+  // As a process that is started anew, workers included, does it.
+  void OpenLoop() {
+    loop_.reset();
     store_ = *OpenSqliteJobStore(store_path_);
-    auto opened =
-        Conductor::Open("wall", wall_.cameras, wall_.points, options_, store_.get(), blobs_.get(), &clock_, &pool_);
+    const std::vector<OpenJob> open = *store_->ListOpenJobs();
+    for (const OpenJob& job : open) {
+      if (!job.lease_worker.empty()) Change(ChangeOf(JobChange::Kind::kRelease, job.sequence, job.epoch));
+    }
+    epoch_ = *store_->AcquireConductorLease("wall", "test", clock_.Now() + absl::Minutes(1), clock_.Now());
+    const ReconstructionConfig config = {
+        .conductor = options_,
+        .job_bytes = [](const CameraJobSpec& spec, const std::vector<Camera>&) { return 8 >> spec.reduction; }};
+    auto opened = OuterLoop::Open({.store = store_.get(), .blobs = blobs_.get(), .clock = &clock_, .pool = &pool_},
+                                  "wall", epoch_, wall_.cameras, wall_.points, config);
     ASSERT_TRUE(opened.ok()) << opened.status();
-    conductor_ = *std::move(opened);
+    loop_ = *std::move(opened);
+    ASSERT_TRUE(loop_->Step().ok());
+  }
+
+  static JobChange ChangeOf(JobChange::Kind kind, SequenceNumber sequence, int64_t epoch) {
+    return {.kind = kind, .id = "wall", .sequence = sequence, .epoch = epoch, .worker = "w", .instance = "1"};
+  }
+  JobChangeResult Change(JobChange change) {
+    change.expires_at = clock_.Now() + absl::Minutes(1);
+    return store_->ApplyChanges({change}, {}, clock_.Now())->front();
+  }
+
+  // Claims all jobs that wait, by sequence.
+  std::vector<CameraJobSpec> TakeJobs() {
+    std::vector<CameraJobSpec> taken;
+    const std::vector<OpenJob> open = *store_->ListOpenJobs();
+    for (const OpenJob& waiting : open) {
+      if (!waiting.lease_worker.empty()) continue;
+      const CameraJob job = *Change(ChangeOf(JobChange::Kind::kClaim, waiting.sequence, waiting.epoch)).job;
+      const StoredJobSpec stored = *DecodeJobSpec(job.spec);
+      taken.push_back({.sequence = job.sequence,
+                       .camera = job.camera,
+                       .snapshot = job.snapshot,
+                       .epoch = job.epoch,
+                       .neighbours = job.neighbours,
+                       .targets = stored.targets,
+                       .accepted = stored.accepted});
+    }
+    return taken;
   }
 
   std::string PutFiltered(const CameraJobSpec& spec) {
     return *blobs_->Put(EncodeSurface(FakeFilteredSurface(wall_, spec)));
   }
 
-  absl::Status Finish(const CameraJobSpec& spec) {
-    return conductor_->Complete(spec.sequence, spec.epoch, PutFiltered(spec), {}, "{}");
+  // What a worker says, before anybody looks at it.
+  absl::Status Report(const CameraJobSpec& spec, const std::string& digest,
+                      const std::vector<CameraIndex>& weak_targets = {}) {
+    JobChange change = ChangeOf(JobChange::Kind::kComplete, spec.sequence, spec.epoch);
+    change.filtered_digest = digest;
+    change.weak_targets = weak_targets;
+    change.report_json = "{}";
+    return Change(change).status;
   }
+
+  absl::Status Finish(const CameraJobSpec& spec) {
+    const absl::Status reported = Report(spec, PutFiltered(spec));
+    return reported.ok() ? loop_->Step().status() : reported;
+  }
+
+  bool finished() const { return loop_->conductor().finished(); }
+  int64_t committed() const { return loop_->conductor().progress().cameras_committed; }
 
   // Runs to the end, finishing jobs in an order drawn from `seed` and dying now and then.
   void RunToTheEnd(unsigned seed, double death_rate) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform(0, 1);
     std::vector<CameraJobSpec> held;
-    while (!conductor_->finished()) {
-      for (CameraJobSpec& spec : conductor_->TakeJobs()) held.push_back(std::move(spec));
+    while (!finished()) {
+      for (CameraJobSpec& spec : TakeJobs()) held.push_back(std::move(spec));
       ASSERT_FALSE(held.empty());
       const size_t pick = random() % held.size();
       const bool dies_with_surface_stored = uniform(random) < death_rate;
+      const bool dies_with_result_stored = uniform(random) < death_rate;
       if (dies_with_surface_stored) {
         PutFiltered(held[pick]);
+      } else if (dies_with_result_stored) {
+        ASSERT_TRUE(Report(held[pick], PutFiltered(held[pick])).ok());
       } else {
         ASSERT_TRUE(Finish(held[pick]).ok());
         held.erase(held.begin() + static_cast<std::ptrdiff_t>(pick));
       }
-      if (dies_with_surface_stored || uniform(random) < death_rate) {
+      if (dies_with_surface_stored || dies_with_result_stored || uniform(random) < death_rate) {
         held.clear();
-        OpenConductor();
+        OpenLoop();
       }
     }
   }
 
   std::vector<std::string> AcceptedDigests() const {
     std::vector<std::string> digests;
-    for (const AcceptedSurface& surface : conductor_->AcceptedSurfaces()) {
+    for (const AcceptedSurface& surface : loop_->conductor().AcceptedSurfaces()) {
       digests.push_back(absl::StrCat(surface.sequence, ":", surface.camera, ":", surface.digest));
     }
     return digests;
@@ -140,7 +196,8 @@ class ConductorTest : public testing::Test {
   std::string store_path_;
   std::unique_ptr<BlobStore> blobs_;
   std::unique_ptr<JobStore> store_;
-  std::unique_ptr<Conductor> conductor_;
+  int64_t epoch_ = 0;  // of the conductor's lease
+  std::unique_ptr<OuterLoop> loop_;
 };
 
 TEST_F(ConductorTest, TheAnswerDoesNotDependOnTheOrderOfResults) {
@@ -148,10 +205,9 @@ TEST_F(ConductorTest, TheAnswerDoesNotDependOnTheOrderOfResults) {
   RunToTheEnd(0, 0);
   const std::vector<std::string> expected = AcceptedDigests();
   EXPECT_FALSE(expected.empty());
-  const Progress progress = conductor_->progress();
+  const Progress progress = loop_->conductor().progress();
   EXPECT_EQ(progress.cameras_committed, 10);
   EXPECT_EQ(progress.cameras_total, 10);
-  EXPECT_EQ(store_->GetReconstruction("wall")->state, ReconstructionState::kDone);
   for (unsigned seed = 1; seed < 4; ++seed) {
     StartAnew(absl::StrCat("run", seed), {});
     RunToTheEnd(seed, 0);
@@ -167,19 +223,19 @@ TEST_F(ConductorTest, TheAnswerDoesNotDependOnDeaths) {
     StartAnew(absl::StrCat("run", seed), {});
     RunToTheEnd(seed, 0.4);
     EXPECT_EQ(AcceptedDigests(), expected);
-    const Progress progress = conductor_->progress();
-    OpenConductor();
-    EXPECT_TRUE(conductor_->finished());
+    const Progress progress = loop_->conductor().progress();
+    OpenLoop();
+    EXPECT_TRUE(finished());
     EXPECT_EQ(AcceptedDigests(), expected);
-    EXPECT_EQ(conductor_->progress().patches_accepted, progress.patches_accepted);
-    EXPECT_EQ(conductor_->progress().patches_filtered, progress.patches_filtered);
+    EXPECT_EQ(loop_->conductor().progress().patches_accepted, progress.patches_accepted);
+    EXPECT_EQ(loop_->conductor().progress().patches_filtered, progress.patches_filtered);
   }
 }
 
 TEST_F(ConductorTest, JobsSeeExactlyTheSurfacesOfTheirSnapshot) {
   StartAnew("run", {});
-  std::vector<CameraJobSpec> held = conductor_->TakeJobs();
-  while (!conductor_->finished()) {
+  std::vector<CameraJobSpec> held = TakeJobs();
+  while (!finished()) {
     ASSERT_FALSE(held.empty());
     for (const CameraJobSpec& spec : held) {
       for (const AcceptedSurface& surface : spec.accepted) EXPECT_LE(surface.sequence, spec.snapshot);
@@ -190,10 +246,10 @@ TEST_F(ConductorTest, JobsSeeExactlyTheSurfacesOfTheirSnapshot) {
     ASSERT_TRUE(Finish(held.front()).ok());
     held.erase(held.begin());
     // Opened anew, the conductor hands out the same jobs with the same snapshots.
-    std::vector<CameraJobSpec> more = conductor_->TakeJobs();
+    std::vector<CameraJobSpec> more = TakeJobs();
     held.insert(held.end(), more.begin(), more.end());
-    OpenConductor();
-    std::vector<CameraJobSpec> again = conductor_->TakeJobs();
+    OpenLoop();
+    std::vector<CameraJobSpec> again = TakeJobs();
     ASSERT_EQ(again.size(), held.size());
     for (size_t i = 0; i < held.size(); ++i) {
       EXPECT_EQ(again[i].sequence, held[i].sequence);
@@ -209,47 +265,103 @@ TEST_F(ConductorTest, JobsSeeExactlyTheSurfacesOfTheirSnapshot) {
 
 TEST_F(ConductorTest, AResultFromBeforeARestartIsRefused) {
   StartAnew("run", {});
-  const std::vector<CameraJobSpec> before = conductor_->TakeJobs();
-  OpenConductor();
+  const std::vector<CameraJobSpec> before = TakeJobs();
+  OpenLoop();
+  ASSERT_EQ(TakeJobs().size(), before.size());
   EXPECT_TRUE(absl::IsAborted(Finish(before.front())));
-  EXPECT_EQ(conductor_->progress().cameras_committed, 0);
+  EXPECT_EQ(committed(), 0);
+}
+
+TEST_F(ConductorTest, WhoLostTheLeaseChangesNothing) {
+  StartAnew("run", {});
+  const std::vector<CameraJobSpec> held = TakeJobs();
+  clock_.Advance(absl::Minutes(2));
+  ASSERT_TRUE(store_->AcquireConductorLease("wall", "other", clock_.Now() + absl::Minutes(1), clock_.Now()).ok());
+  EXPECT_TRUE(absl::IsAborted(Finish(held.front())));
+  EXPECT_TRUE(store_->ListCommits("wall")->empty());
+  EXPECT_EQ(store_->ListCameraJobs("wall")->size(), held.size());
 }
 
 TEST_F(ConductorTest, RepeatedResultsAreHarmless) {
   StartAnew("run", {});
-  const std::vector<CameraJobSpec> held = conductor_->TakeJobs();
+  const std::vector<CameraJobSpec> held = TakeJobs();
   EXPECT_TRUE(Finish(held.front()).ok());
-  EXPECT_TRUE(Finish(held.front()).ok());
-  EXPECT_EQ(conductor_->progress().cameras_committed, 1);
+  EXPECT_TRUE(absl::IsAborted(Finish(held.front())));
+  EXPECT_TRUE(loop_->Step().ok());
+  EXPECT_EQ(committed(), 1);
 }
 
-TEST_F(ConductorTest, ResultsThatDoNotFitAreRefused) {
+TEST_F(ConductorTest, ResultsThatAreNoneAreTakenBackAndThenTheJobIsSkipped) {
   StartAnew("run", {});
-  const CameraJobSpec spec = conductor_->TakeJobs().front();
-  EXPECT_TRUE(absl::IsNotFound(conductor_->Complete(77, 1, PutFiltered(spec), {}, "{}")));
-  EXPECT_TRUE(
-      absl::IsInvalidArgument(conductor_->Complete(spec.sequence, spec.epoch, PutFiltered(spec), {spec.camera}, "{}")));
-  EXPECT_TRUE(
-      absl::IsFailedPrecondition(conductor_->Complete(spec.sequence, spec.epoch, std::string(64, 'a'), {}, "{}")));
-  EXPECT_EQ(conductor_->progress().cameras_committed, 0);
-  EXPECT_TRUE(Finish(spec).ok());
+  CameraJobSpec spec = TakeJobs().front();
+  const std::string none[] = {PutFiltered(spec), std::string(64, 'a'), *blobs_->Put("not a surface")};
+  for (int64_t attempt = 0; attempt < 3; ++attempt) {
+    const std::vector<CameraIndex> weak =
+        attempt == 0 ? std::vector<CameraIndex>{spec.camera} : std::vector<CameraIndex>();
+    ASSERT_TRUE(Report(spec, none[attempt], weak).ok());
+    ASSERT_TRUE(loop_->Step().ok());
+    EXPECT_EQ(store_->GetCameraJob("wall", spec.sequence)->failed_attempts, attempt + 1);
+    EXPECT_EQ(committed(), 0);
+    if (attempt < 2) spec = TakeJobs().front();
+  }
+  ASSERT_TRUE(loop_->Step().ok());
+  EXPECT_EQ(store_->GetCameraJob("wall", spec.sequence)->state, CameraJobState::kSkipped);
+  EXPECT_EQ(committed(), 1);
+}
+
+TEST_F(ConductorTest, AResultThatIsNoneDoesNotKeepAConductorFromOpening) {
+  StartAnew("run", {});
+  const CameraJobSpec spec = TakeJobs().front();
+  ASSERT_TRUE(Report(spec, *blobs_->Put("not a surface")).ok());
+  OpenLoop();
+  EXPECT_EQ(store_->GetCameraJob("wall", spec.sequence)->failed_attempts, 1);
+  RunToTheEnd(0, 0);
+}
+
+// Blobs that are damaged or lost are made again, from jobs or from acceptance, and nothing else changes.
+TEST_F(ConductorTest, LostSurfacesAreMadeAgain) {
+  StartAnew("reference", {});
+  RunToTheEnd(0, 0);
+  const std::vector<std::string> expected = AcceptedDigests();
+  const std::vector<CameraJob> jobs = *store_->ListCameraJobs("wall");
+  for (const CameraJob& job : jobs) ASSERT_TRUE(blobs_->Delete(job.filtered_digest).ok());
+  const std::vector<Commit> commits = *store_->ListCommits("wall");
+  for (const Commit& commit : commits) {
+    if (commit.accepted_digest.empty()) continue;
+    ASSERT_TRUE(blobs_->Delete(commit.accepted_digest).ok());
+    ASSERT_TRUE(store_->ReportDamagedBlob("wall", commit.accepted_digest).ok());
+  }
+  ASSERT_TRUE(store_->ReportDamagedBlob("wall", std::string(64, 'f')).ok());  // nobody's
+  for (int step = 0; step < 100; ++step) {
+    const auto progress = loop_->Step();
+    ASSERT_TRUE(progress.ok()) << progress.status();
+    if (progress->finished) break;
+    for (const CameraJobSpec& spec : TakeJobs()) ASSERT_TRUE(Report(spec, PutFiltered(spec)).ok());
+  }
+  EXPECT_TRUE(store_->ListDamagedBlobs("wall")->empty());
+  EXPECT_EQ(AcceptedDigests(), expected);
+  for (const AcceptedSurface& surface : loop_->conductor().AcceptedSurfaces()) {
+    EXPECT_TRUE(blobs_->Get(surface.digest).ok());
+  }
 }
 
 TEST_F(ConductorTest, ASkippedCameraIsNobodysTargetAndTheRestGoesOn) {
   StartAnew("run", {});
-  const CameraJobSpec lost = conductor_->TakeJobs().front();
-  ASSERT_TRUE(conductor_->Skip(lost.sequence, lost.epoch, "picture is gone").ok());
-  OpenConductor();
-  while (!conductor_->finished()) {
-    for (const CameraJobSpec& spec : conductor_->TakeJobs()) {
+  const CameraJobSpec lost = TakeJobs().front();
+  JobChange skip = ChangeOf(JobChange::Kind::kSkipped, lost.sequence, lost.epoch);
+  skip.reason = "picture is gone";
+  ASSERT_TRUE(Change(skip).status.ok());
+  OpenLoop();
+  while (!finished()) {
+    for (const CameraJobSpec& spec : TakeJobs()) {
       if (spec.snapshot >= lost.sequence) {
         EXPECT_THAT(spec.targets, testing::Not(testing::Contains(lost.camera)));
       }
       ASSERT_TRUE(Finish(spec).ok());
     }
   }
-  EXPECT_EQ(conductor_->progress().cameras_skipped, 1);
-  for (const AcceptedSurface& surface : conductor_->AcceptedSurfaces()) EXPECT_NE(surface.camera, lost.camera);
+  EXPECT_EQ(loop_->conductor().progress().cameras_skipped, 1);
+  for (const AcceptedSurface& surface : loop_->conductor().AcceptedSurfaces()) EXPECT_NE(surface.camera, lost.camera);
 }
 
 TEST_F(ConductorTest, AStoreOfOtherOptionsIsRefused) {
@@ -257,17 +369,11 @@ TEST_F(ConductorTest, AStoreOfOtherOptionsIsRefused) {
   RunToTheEnd(0, 0);
   options_.window = 1;
   options_.pairs.max_angle_deg = 8;
-  conductor_.reset();
+  loop_.reset();
   const auto opened =
-      Conductor::Open("wall", wall_.cameras, wall_.points, options_, store_.get(), blobs_.get(), &clock_, &pool_);
+      Conductor::Open("wall", wall_.cameras, wall_.points, options_, store_.get(), blobs_.get(), &clock_, &pool_,
+                      epoch_, [](const CameraJobSpec&) { return std::vector<int64_t>{1}; });
   EXPECT_TRUE(absl::IsDataLoss(opened.status())) << opened.status();
-}
-
-TEST_F(ConductorTest, ADamagedSurfaceIsNoticed) {
-  StartAnew("run", {});
-  const CameraJobSpec spec = conductor_->TakeJobs().front();
-  const std::string digest = *blobs_->Put("not a surface");
-  EXPECT_TRUE(absl::IsDataLoss(conductor_->Complete(spec.sequence, spec.epoch, digest, {}, "{}")));
 }
 
 TEST_F(ConductorTest, OptionsAreChecked) {

@@ -27,8 +27,6 @@ constexpr int kMaxFailures = 12;
 constexpr std::chrono::seconds kRetryDelay(10);
 // Results that other coordinators took are noticed by looking again.
 constexpr std::chrono::milliseconds kPollInterval(250);
-// A job is made smaller at most so often; each time its lattice is spaced twice as wide.
-constexpr int kMaxReductions = 2;
 constexpr int kMaxRepairsInARow = 100;
 
 bool IsPermanent(const absl::Status& status) {
@@ -60,12 +58,13 @@ absl::StatusOr<FileFacts> FactsOf(const std::string& path) {
 }  // namespace
 
 ReconstructionDriver::ReconstructionDriver(const DriverEnvironment& environment, const CoordinatorFolders& folders,
-                                           std::string id, int64_t epoch, bool is_deleting,
+                                           std::string id, HeldConductorLease lease, bool is_deleting,
                                            std::function<void(bool)> changed)
     : environment_(environment),
       folders_(folders),
       id_(std::move(id)),
-      epoch_(epoch),
+      lease_(std::move(lease)),
+      epoch_(lease_.epoch()),
       is_deleting_(is_deleting),
       changed_(std::move(changed)),
       referenced_blobs_(id_, *environment.store, *environment.blobs) {
@@ -83,30 +82,39 @@ ReconstructionDriver::~ReconstructionDriver() {
 
 void ReconstructionDriver::RequestStop() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
 }
 
 void ReconstructionDriver::Wake() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     has_news_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
 }
 
 bool ReconstructionDriver::WaitForNews() {
-  std::unique_lock<std::mutex> lock(mutex_);
-  wake_.wait_for(lock, kPollInterval, [&] { return stopping_ || has_news_; });
+  MutexLock lock(mutex_);
+  if (!stopping_ && !has_news_) wake_.WaitFor(lock, kPollInterval);
   has_news_ = false;
+  return !stopping_;
+}
+
+bool ReconstructionDriver::WaitToRetry() {
+  const auto until = std::chrono::steady_clock::now() + kRetryDelay;
+  MutexLock lock(mutex_);
+  while (!stopping_ && std::chrono::steady_clock::now() < until) {
+    wake_.WaitFor(lock, until - std::chrono::steady_clock::now());
+  }
   return !stopping_;
 }
 
 absl::Status ReconstructionDriver::SetState(ReconstructionState state, const std::string& reason) {
   const absl::Status status =
-      environment_.store->SetReconstructionState(id_, state, environment_.clock->Now(), ToUtf8(reason), epoch_);
+      environment_.store->SetReconstructionState(id_, state, ToUtf8(reason), environment_.clock->Now(), epoch_);
   changed_(false);
   // Cancelled or deleted meanwhile.
   return absl::IsFailedPrecondition(status) || absl::IsNotFound(status) ? Stopped() : status;
@@ -116,7 +124,7 @@ void ReconstructionDriver::Run() {
   for (int failures = 1;; ++failures) {
     const absl::Status status = Conduct();
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       // Aborted: somebody else conducts it now.
       if (status.ok() || stopping_ || absl::IsCancelled(status) || absl::IsAborted(status)) return;
     }
@@ -124,8 +132,7 @@ void ReconstructionDriver::Run() {
       SetState(ReconstructionState::kFailed, std::string(status.message())).IgnoreError();
       return;
     }
-    std::unique_lock<std::mutex> lock(mutex_);
-    if (wake_.wait_for(lock, kRetryDelay, [&] { return stopping_; })) return;
+    if (!WaitToRetry()) return;
   }
 }
 
@@ -135,43 +142,41 @@ absl::Status ReconstructionDriver::Conduct() {
   if (IsFinal(record_.state) || record_.state == ReconstructionState::kDeleting) return absl::OkStatus();
   MW_ASSIGN_OR_RETURN(const ReconstructionConfig config, environment_.parse_config(record_.options_json));
   MW_RETURN_IF_ERROR(PrepareScene(config));
-  MW_ASSIGN_OR_RETURN(const std::unique_ptr<Conductor> conductor, OpenConductor(config));
+  MW_ASSIGN_OR_RETURN(const std::unique_ptr<OuterLoop> loop, OpenLoop(config));
   MW_RETURN_IF_ERROR(SetState(ReconstructionState::kRunning));
   environment_.jobs_changed();
-  MW_RETURN_IF_ERROR(RunJobs(*conductor));
-  return Join(config, *conductor);
+  MW_RETURN_IF_ERROR(RunJobs(*loop));
+  return Join(config, *loop);
 }
 
 absl::Status ReconstructionDriver::DeleteEverything() {
   MW_ASSIGN_OR_RETURN(const std::vector<std::string> blobs, environment_.store->MarkBlobsForDeletion(id_));
   for (const std::string& digest : blobs) {
     MW_RETURN_IF_ERROR(environment_.blobs->Delete(digest));
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (stopping_) return Stopped();
   }
   return environment_.store->DeleteReconstruction(id_);
 }
 
-absl::StatusOr<std::string> ReconstructionDriver::SceneFolder(bool* is_temporary) {
-  *is_temporary = record_.scene_reference.empty();
-  if (!*is_temporary) {
-    absl::StatusOr<std::string> folder = ResolveSceneReference(record_.scene_reference, folders_.scene_roots);
-    if (!folder.ok()) return BadInput(folder.status());
-    return folder;
+absl::StatusOr<ReconstructionDriver::SceneFolder> ReconstructionDriver::FindSceneFolder() {
+  if (!record_.scene_reference.empty()) {
+    absl::StatusOr<std::string> path = ResolveSceneReference(record_.scene_reference, folders_.scene_roots);
+    if (!path.ok()) return BadInput(path.status());
+    return SceneFolder{.path = *std::move(path)};
   }
-  std::string folder = absl::StrCat(folders_.data, "/uploads/", id_, "-", epoch_);
+  std::string path = absl::StrCat(folders_.data, "/uploads/", id_, "-", epoch_);
   MW_ASSIGN_OR_RETURN(const std::vector<SceneFile> files, environment_.store->ListSceneFiles(id_));
-  MW_RETURN_IF_ERROR(MaterializeScene(files, *environment_.blobs, folder));
-  return folder;
+  MW_RETURN_IF_ERROR(MaterializeScene(files, *environment_.blobs, path));
+  return SceneFolder{.path = std::move(path), .is_temporary = true};
 }
 
 absl::StatusOr<IngestedScene> ReconstructionDriver::Take() {
-  bool is_temporary = false;
-  MW_ASSIGN_OR_RETURN(const std::string folder, SceneFolder(&is_temporary));
-  absl::StatusOr<IngestedScene> taken = IngestScene(
-      folder, is_temporary ? folder : SceneRootOf(folder, folders_.scene_roots), referenced_blobs_, *environment_.pool);
+  MW_ASSIGN_OR_RETURN(const SceneFolder folder, FindSceneFolder());
+  const std::string root = folder.is_temporary ? folder.path : SceneRootOf(folder.path, folders_.scene_roots);
+  absl::StatusOr<IngestedScene> taken = IngestScene(folder.path, root, referenced_blobs_, *environment_.pool);
   std::error_code error;
-  if (is_temporary) fs::remove_all(folder, error);
+  if (folder.is_temporary) fs::remove_all(folder.path, error);
   return taken;
 }
 
@@ -200,115 +205,76 @@ absl::Status ReconstructionDriver::PrepareScene(const ReconstructionConfig& conf
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::unique_ptr<Conductor>> ReconstructionDriver::OpenConductor(const ReconstructionConfig& config) {
-  const auto job_bytes = [this, &config](CameraJobSpec spec) {
-    std::vector<int64_t> bytes;
-    for (spec.reduction = 0; spec.reduction <= kMaxReductions; ++spec.reduction) {
-      bytes.push_back(config.job_bytes(spec, cameras_));
-    }
-    return bytes;
-  };
-  absl::StatusOr<std::unique_ptr<Conductor>> conductor =
-      Conductor::Open(id_, cameras_, points_, config.conductor, environment_.store, environment_.blobs,
-                      environment_.clock, environment_.pool, {.epoch = epoch_, .job_bytes = job_bytes});
-  if (absl::IsFailedPrecondition(conductor.status())) return BadInput(conductor.status());
-  return conductor;
+absl::StatusOr<std::unique_ptr<OuterLoop>> ReconstructionDriver::OpenLoop(const ReconstructionConfig& config) {
+  const OuterLoopEnvironment environment = {.store = environment_.store,
+                                            .blobs = environment_.blobs,
+                                            .clock = environment_.clock,
+                                            .pool = environment_.pool,
+                                            .max_failures = environment_.max_failures};
+  MW_ASSIGN_OR_RETURN(std::unique_ptr<OuterLoop> loop,
+                      OuterLoop::Open(environment, id_, epoch_, cameras_, points_, config));
+  loop->SetRepairOther([this](const std::string& digest) { return RepairScene(digest); });
+  return loop;
 }
 
-absl::Status ReconstructionDriver::RunJobs(Conductor& conductor) {
+absl::Status ReconstructionDriver::RunJobs(OuterLoop& loop) {
   while (true) {
-    absl::StatusOr<bool> handed_out = conductor.IngestResults(environment_.max_failures);
-    if (const std::string damaged = conductor.damaged_blob(); !handed_out.ok() && !damaged.empty()) {
-      MW_RETURN_IF_ERROR(Repair(conductor, damaged));
-      continue;
-    }
-    MW_RETURN_IF_ERROR(handed_out.status());
-    if (*handed_out) environment_.jobs_changed();
+    MW_ASSIGN_OR_RETURN(const OuterLoop::Progress progress, loop.Step());
+    if (progress.has_new_jobs) environment_.jobs_changed();
     changed_(false);
-    MW_RETURN_IF_ERROR(LookAtReports(conductor));
-    if (conductor.finished()) return absl::OkStatus();
+    if (progress.finished) return absl::OkStatus();
     if (!WaitForNews()) return Stopped();
   }
 }
 
-absl::Status ReconstructionDriver::LookAtReports(Conductor& conductor) {
-  MW_ASSIGN_OR_RETURN(const std::vector<std::string> reported, environment_.store->ListDamagedBlobs(id_));
-  for (const std::string& digest : reported) {
-    const absl::Status status = environment_.blobs->Get(digest).status();
-    if (IsBlobLost(status)) MW_RETURN_IF_ERROR(Repair(conductor, digest));
-    if (!status.ok() && !IsBlobLost(status)) return status;
-    MW_RETURN_IF_ERROR(environment_.store->ForgetDamagedBlob(id_, digest));
-  }
-  return absl::OkStatus();
-}
-
-// What is lost is made again, and must come out the same: a surface by its job or its acceptance, a photograph from the
-// scene, as long as that is there.
-absl::Status ReconstructionDriver::Repair(Conductor& conductor, const std::string& digest) {
-  const auto photograph = photographs_.find(digest);
-  if (photograph != photographs_.end() || digest == record_.scene_blob) {
-    const std::string what = photograph == photographs_.end() ? "the scene's cameras and points"
-                                                              : absl::StrCat("photograph ", photograph->second);
-    const absl::StatusOr<IngestedScene> taken = Take();
-    if (taken.ok() && taken->scene_blob == record_.scene_blob) return absl::OkStatus();
-    if (!taken.ok() && !IsPermanent(taken.status()) && !absl::IsNotFound(taken.status())) return taken.status();
-    return absl::DataLossError(
-        absl::StrCat(what, " is damaged or lost (blob ", digest, "), and cannot be read again: ",
-                     taken.ok() ? std::string("the scene is not what it was") : std::string(taken.status().message())));
-  }
-  if (const SequenceNumber job = conductor.JobOfFiltered(digest); job > 0) return RunAgain(job, digest);
-  for (int attempt = 0; attempt < kMaxRepairsInARow; ++attempt) {
-    const absl::Status remade = conductor.RemakeAccepted(digest);
-    const std::string also = conductor.damaged_blob();
-    if (remade.ok() || also.empty()) return remade;
-    const SequenceNumber job = conductor.JobOfFiltered(also);
-    if (job == 0) return remade;
-    MW_RETURN_IF_ERROR(RunAgain(job, also));
-  }
-  return absl::DataLossError(absl::StrCat("blob ", digest, " is damaged and cannot be made again"));
-}
-
-absl::Status ReconstructionDriver::RunAgain(SequenceNumber sequence, const std::string& digest) {
-  JobStore& store = *environment_.store;
+absl::Status ReconstructionDriver::Repair(OuterLoop& loop, const std::string& digest) {
   while (true) {
-    MW_ASSIGN_OR_RETURN(const CameraJob job, store.GetCameraJob(id_, sequence));
-    if (job.state == CameraJobState::kDone) {
-      const absl::Status there = environment_.blobs->Get(digest).status();
-      if (!IsBlobLost(there)) return there;
-      MW_RETURN_IF_ERROR(store.ReopenCameraJob(id_, sequence, job.epoch, digest,
-                                               absl::StrCat("its surface is damaged or lost (blob ", digest, ")"),
-                                               absl::UnixEpoch(), epoch_));
-      environment_.jobs_changed();
-    } else if (job.failed_attempts >= environment_.max_failures) {
-      return absl::DataLossError(absl::StrCat("surface ", digest, " of camera ", job.camera,
-                                              " is damaged or lost and cannot be made again: ", job.last_failure));
-    }
+    MW_ASSIGN_OR_RETURN(const bool is_there, loop.Repair(digest));
+    if (is_there) return absl::OkStatus();
+    environment_.jobs_changed();
     if (!WaitForNews()) return Stopped();
   }
 }
 
-absl::Status ReconstructionDriver::Join(const ReconstructionConfig& config, Conductor& conductor) {
+// The scene is read again, as long as it is there; it must be the same.
+absl::StatusOr<bool> ReconstructionDriver::RepairScene(const std::string& digest) {
+  const auto photograph = photographs_.find(digest);
+  if (photograph == photographs_.end() && digest != record_.scene_blob) {
+    return absl::NotFoundError(absl::StrCat("blob ", digest, " is none of reconstruction ", id_));
+  }
+  const std::string what = photograph == photographs_.end() ? "the scene's cameras and points"
+                                                            : absl::StrCat("photograph ", photograph->second);
+  const absl::StatusOr<IngestedScene> taken = Take();
+  if (taken.ok() && taken->scene_blob == record_.scene_blob) return true;
+  if (!taken.ok() && !IsPermanent(taken.status()) && !absl::IsNotFound(taken.status())) return taken.status();
+  return absl::DataLossError(
+      absl::StrCat(what, " is damaged or lost (blob ", digest, "), and cannot be read again: ",
+                   taken.ok() ? std::string("the scene is not what it was") : std::string(taken.status().message())));
+}
+
+absl::Status ReconstructionDriver::Join(const ReconstructionConfig& config, OuterLoop& loop) {
   MW_RETURN_IF_ERROR(SetState(ReconstructionState::kJoining));
   const absl::Status nothing = BadInput(absl::FailedPreconditionError(
       absl::StrCat("nothing was reconstructed: no surface was supported by ", config.conductor.acceptance.k_a,
                    " other cameras; are the cameras right, and do the photographs show the same surface?")));
-  if (conductor.AcceptedSurfaces().empty()) return nothing;
-  MW_ASSIGN_OR_RETURN(const StoredMesh mesh, WriteMesh(config, conductor));
+  if (loop.conductor().AcceptedSurfaces().empty()) return nothing;
+  MW_ASSIGN_OR_RETURN(const StoredMesh mesh, WriteMesh(config, loop));
   if (mesh.faces == 0) return nothing;
   const absl::Status finished = environment_.store->FinishReconstruction(id_, mesh, environment_.clock->Now(), epoch_);
   return absl::IsFailedPrecondition(finished) ? Stopped() : finished;
 }
 
-absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionConfig& config, Conductor& conductor) {
+absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionConfig& config, OuterLoop& loop) {
   const std::string path = absl::StrCat(folders_.data, "/meshes/", id_, "-", epoch_, ".new");
   absl::StatusOr<JoinedMeshCounts> counts = absl::UnknownError("not tried");
   for (int attempt = 0; attempt < kMaxRepairsInARow && !counts.ok(); ++attempt) {
     LostBlobNamer blobs(*environment_.blobs);
-    counts = WriteAcceptedMesh(conductor.AcceptedSurfaces(), blobs, config.join, offset_, path, *environment_.pool);
+    counts = WriteAcceptedMesh(loop.conductor().AcceptedSurfaces(), blobs, config.join, offset_, path,
+                               *environment_.pool);
     if (counts.ok()) break;
     const std::string lost = LostBlobOf(counts.status());
     if (lost.empty()) return counts.status();
-    MW_RETURN_IF_ERROR(Repair(conductor, lost));
+    MW_RETURN_IF_ERROR(Repair(loop, lost));
   }
   MW_RETURN_IF_ERROR(counts.status());
   MW_ASSIGN_OR_RETURN(const FileFacts facts, FactsOf(path));

@@ -1,11 +1,9 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -14,10 +12,12 @@
 #include <absl/status/statusor.h>
 
 #include "common/base/clock.h"
+#include "common/base/mutex.h"
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
 #include "common/scene/scene.h"
-#include "coordinator/conductor/conductor.h"
+#include "coordinator/conductor/conductor_lease.h"
+#include "coordinator/conductor/outer_loop.h"
 #include "coordinator/conductor/reconstruction_config.h"
 #include "coordinator/conductor/referenced_blobs.h"
 #include "coordinator/conductor/scene_ingestion.h"
@@ -49,10 +49,10 @@ struct CoordinatorFolders {
 // by the epoch of its lease: it may end at any moment and another one goes on, here or elsewhere.
 class ReconstructionDriver {
  public:
-  // `epoch`: of the conductor's lease. `is_deleting`: to be deleted, not conducted. `changed` is called when what the
-  // store says of it may have changed.
+  // `lease`: of its conductor, which the owner renews and releases. `is_deleting`: to be deleted, not conducted.
+  // `changed` is called when what the store says of it may have changed.
   ReconstructionDriver(const DriverEnvironment& environment, const CoordinatorFolders& folders, std::string id,
-                       int64_t epoch, bool is_deleting, std::function<void(bool has_ended)> changed);
+                       HeldConductorLease lease, bool is_deleting, std::function<void(bool has_ended)> changed);
   // Ends after what it is doing at the moment.
   ~ReconstructionDriver();
 
@@ -61,7 +61,7 @@ class ReconstructionDriver {
   void Wake();
   // It has nothing to do any more, for whatever reason; its lease can go.
   bool has_ended() const { return has_ended_; }
-  int64_t epoch() const { return epoch_; }
+  HeldConductorLease& lease() { return lease_; }
   bool is_deleting() const { return is_deleting_; }
 
  private:
@@ -70,20 +70,25 @@ class ReconstructionDriver {
   absl::Status DeleteEverything();
   absl::Status PrepareScene(const ReconstructionConfig& config);
   absl::StatusOr<IngestedScene> Take();
-  absl::StatusOr<std::string> SceneFolder(bool* is_temporary);
-  absl::StatusOr<std::unique_ptr<Conductor>> OpenConductor(const ReconstructionConfig& config);
-  absl::Status RunJobs(Conductor& conductor);
-  absl::Status Join(const ReconstructionConfig& config, Conductor& conductor);
-  absl::StatusOr<StoredMesh> WriteMesh(const ReconstructionConfig& config, Conductor& conductor);
-  absl::Status LookAtReports(Conductor& conductor);
-  absl::Status Repair(Conductor& conductor, const std::string& digest);
-  absl::Status RunAgain(SequenceNumber sequence, const std::string& digest);
+  struct SceneFolder {
+    std::string path;
+    bool is_temporary = false;  // made for this, and to be removed
+  };
+  absl::StatusOr<SceneFolder> FindSceneFolder();
+  absl::StatusOr<std::unique_ptr<OuterLoop>> OpenLoop(const ReconstructionConfig& config);
+  absl::Status RunJobs(OuterLoop& loop);
+  absl::Status Join(const ReconstructionConfig& config, OuterLoop& loop);
+  absl::StatusOr<StoredMesh> WriteMesh(const ReconstructionConfig& config, OuterLoop& loop);
+  absl::Status Repair(OuterLoop& loop, const std::string& digest);
+  absl::StatusOr<bool> RepairScene(const std::string& digest);
   absl::Status SetState(ReconstructionState state, const std::string& reason = "");
   bool WaitForNews();
+  bool WaitToRetry();
 
   const DriverEnvironment environment_;
   const CoordinatorFolders folders_;
   const std::string id_;
+  HeldConductorLease lease_;  // the owner's
   const int64_t epoch_;
   const bool is_deleting_;
   const std::function<void(bool has_ended)> changed_;
@@ -97,10 +102,10 @@ class ReconstructionDriver {
   std::map<std::string, std::string> photographs_;    // digest -> name
 
   std::atomic<bool> has_ended_{false};
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  bool has_news_ = false;
-  bool stopping_ = false;
+  Mutex mutex_;
+  ConditionVariable wake_;
+  bool has_news_ ABSL_GUARDED_BY(mutex_) = false;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <future>
-#include <set>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
 #include "common/base/status_macros.h"
-#include "common/job/job_spec_codec.h"
 #include "coordinator/dispatch/proto_times.h"
+#include "coordinator/dispatch/report_from_proto.h"
 
 namespace meshwright {
 namespace {
@@ -33,19 +32,16 @@ constexpr int kLeasesUntilForgotten = 10;
 constexpr absl::Duration kLookAtWorkers = absl::Seconds(1);
 constexpr size_t kMaxBackgrounds = 1000;
 
-JobKey FromProto(const v1::JobKey& key) { return {key.reconstruction_id(), key.sequence(), key.epoch()}; }
-JobKey KeyOf(const OpenJob& job) { return {job.reconstruction_id, job.sequence, job.epoch}; }
-
 void FillKey(const OpenJob& job, v1::JobKey& key) {
   key.set_reconstruction_id(job.reconstruction_id);
   key.set_sequence(job.sequence);
   key.set_epoch(job.epoch);
 }
 
-std::set<JobKey> RunningAt(const v1::SynchronizeRequest& request) {
+std::set<JobKey> RunningAt(const WorkerReport& report) {
   std::set<JobKey> running;
-  for (const v1::HeldJob& held : request.held()) {
-    if (held.outcome_case() == v1::HeldJob::kRunning) running.insert(FromProto(held.key()));
+  for (const HeldJob& held : report.held) {
+    if (std::holds_alternative<JobRunning>(held.outcome)) running.insert(held.key);
   }
   return running;
 }
@@ -108,10 +104,10 @@ WorkerService::~WorkerService() {
 
 void WorkerService::Shutdown() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
 }
 
 absl::Status WorkerService::Drain(const std::string& worker) {
@@ -121,31 +117,31 @@ absl::Status WorkerService::Drain(const std::string& worker) {
   }
   MW_RETURN_IF_ERROR(drained);
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     workers_changed_ = true;
     awake_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   return absl::OkStatus();
 }
 
 void WorkerService::Wake() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     awake_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
 }
 
 void WorkerService::SetListener(std::function<void(const std::string&)> listener) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   listener_ = std::move(listener);
 }
 
 int64_t WorkerService::Synchronize(const v1::SynchronizeRequest& request, Answer answer) {
   absl::Status status = Validate(request);
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (stopping_ && status.ok()) status = absl::UnavailableError("the coordinator is going down");
     if (status.ok() && workers_.size() >= kMaxWorkers && workers_.count(request.worker_id()) == 0) {
       status = absl::ResourceExhaustedError(absl::StrCat("there are ", kMaxWorkers, " workers already"));
@@ -155,9 +151,13 @@ int64_t WorkerService::Synchronize(const v1::SynchronizeRequest& request, Answer
       const double wait = std::min(request.wait_timeout_seconds(), absl::ToDoubleSeconds(lease_.lease / 3));
       const auto deadline =
           SteadyClock::now() + std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(wait));
-      calls_.push_back({.number = next_call_++, .request = request, .answer = std::move(answer), .deadline = deadline});
+      calls_.push_back({.number = next_call_++,
+                        .request = request,
+                        .report = FromProto(request),
+                        .answer = std::move(answer),
+                        .deadline = deadline});
       awake_ = true;
-      wake_.notify_all();
+      wake_.NotifyAll();
       return calls_.back().number;
     }
   }
@@ -167,11 +167,11 @@ int64_t WorkerService::Synchronize(const v1::SynchronizeRequest& request, Answer
 
 void WorkerService::Abandon(int64_t call) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     abandoned_.push_back(call);
     awake_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
 }
 
 absl::StatusOr<v1::SynchronizeResponse> WorkerService::Synchronize(const v1::SynchronizeRequest& request,
@@ -188,29 +188,29 @@ absl::StatusOr<v1::SynchronizeResponse> WorkerService::Synchronize(const v1::Syn
 }
 
 void WorkerService::Run() {
-  std::unique_lock<std::mutex> lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
     const auto look_again =
         calls_.empty() ? std::min(kPollIdle, std::chrono::milliseconds(absl::ToInt64Milliseconds(lease_.lease / 5)))
                        : kPoll;
     auto until = SteadyClock::now() + look_again;
     for (const Call& call : calls_) until = std::min(until, call.deadline);
-    wake_.wait_until(lock, until, [&] { return awake_ || stopping_; });
+    while (!awake_ && !stopping_ && SteadyClock::now() < until) wake_.WaitFor(lock, until - SteadyClock::now());
     awake_ = false;
     const bool last = stopping_;
-    lock.unlock();
-    Turn();
-    lock.lock();
+    lock.Unlock();
+    AnswerCalls();
+    lock.Lock();
     if (last && calls_.empty()) return;
   }
 }
 
-void WorkerService::Turn() {
+void WorkerService::AnswerCalls() {
   std::list<Call> calls;
   std::vector<int64_t> abandoned;
   bool stopping = false;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     calls.swap(calls_);
     abandoned.swap(abandoned_);
     stopping = stopping_;
@@ -232,7 +232,7 @@ void WorkerService::Turn() {
       call = calls.erase(call);
     }
   }
-  const absl::Status status = TakeTurn(calls);
+  const absl::Status status = MakePass(calls);
   if (!status.ok()) {
     for (auto call = calls.begin(); call != calls.end();) {
       if (call->is_heard && call->deadline > SteadyClock::now()) {
@@ -244,41 +244,42 @@ void WorkerService::Turn() {
     }
     if (!stopping) std::this_thread::sleep_for(kAfterFailure);
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   calls_.splice(calls_.begin(), calls);
 }
 
-absl::Status WorkerService::TakeTurn(std::list<Call>& calls) {
+absl::Status WorkerService::MakePass(std::list<Call>& calls) {
   MW_ASSIGN_OR_RETURN(const absl::Time now, store_.Now());
   MW_ASSIGN_OR_RETURN(std::vector<OpenJob> open, store_.ListOpenJobs());
   MW_RETURN_IF_ERROR(LookAtWorkers(now));
   // Who could not be heard was not silent: after a pause of this coordinator (or its store) workers get some time.
-  if (now - last_turn_ > lease_.lease / 2) silence_counts_from_ = now + lease_.lease / 2;
-  last_turn_ = now;
+  if (now - last_pass_ > lease_.lease / 2) silence_counts_from_ = now + lease_.lease / 2;
+  last_pass_ = now;
 
-  SchedulingPass plan(lease_, retry_, std::move(open), now, [this](const OpenJob& job) -> std::vector<int64_t> {
-    const absl::StatusOr<CameraJob> stored = store_.GetCameraJob(job.reconstruction_id, job.sequence);
-    if (!stored.ok()) return {};
-    const absl::StatusOr<StoredJobSpec> spec = DecodeJobSpec(stored->spec);
-    return spec.ok() ? spec->memory_bytes : std::vector<int64_t>();
-  });
+  SchedulingPass pass(lease_, retry_, std::move(open), now, MemoryStepsOf(store_));
   for (Call& call : calls) {
-    if (!call.is_heard) call.is_settled = plan.ApplyReport(call.request);
+    if (!call.is_heard) call.is_settled = pass.ApplyReport(call.report);
   }
-  plan.Expire(now >= silence_counts_from_);
+  pass.Expire(now >= silence_counts_from_);
   for (const Call& call : calls) {
-    const auto worker = written_workers_.find(call.request.worker_id());
-    if (worker == written_workers_.end() || !worker->second.drained) plan.Grant(call.request);
+    const auto worker = written_workers_.find(call.report.worker);
+    if (worker == written_workers_.end() || !worker->second.drained) pass.Grant(call.report);
   }
-  MW_RETURN_IF_ERROR(Apply(plan, Heartbeats(calls, now), now));
-  Publish(plan, now);
+  const std::vector<WorkerRecord> heartbeats = Heartbeats(calls, now);
+  MW_ASSIGN_OR_RETURN(AppliedPass applied, ApplyPass(pass, heartbeats, store_, now));
+  for (const WorkerRecord& worker : heartbeats) written_workers_[worker.id] = worker;
+  for (AppliedPass::Claim& claim : applied.claims) {
+    claimed_[{claim.reconstruction, claim.job.sequence}] = std::move(claim.job);
+  }
+  Tell(applied.news);
+  Publish(pass, now);
 
   for (auto call = calls.begin(); call != calls.end();) {
     call->is_heard = true;
-    const std::vector<const OpenJob*> held = plan.HeldBy(call->request.worker_id(), call->request.instance());
+    const std::vector<const OpenJob*> held = pass.HeldBy(call->report.worker, call->report.instance);
     std::set<JobKey> wanted;
     for (const OpenJob* const job : held) wanted.insert(KeyOf(*job));
-    if (!call->is_settled && wanted == RunningAt(call->request) && call->deadline > SteadyClock::now()) {
+    if (!call->is_settled && wanted == RunningAt(call->report) && call->deadline > SteadyClock::now()) {
       ++call;
       continue;
     }
@@ -288,49 +289,14 @@ absl::Status WorkerService::TakeTurn(std::list<Call>& calls) {
   return absl::OkStatus();
 }
 
-absl::Status WorkerService::Apply(SchedulingPass& plan, const std::vector<WorkerRecord>& heartbeats, absl::Time now) {
-  const std::vector<SchedulingPass::Change> decided = plan.changes();
-  std::vector<JobChange> changes;
-  changes.reserve(decided.size());
-  for (const SchedulingPass::Change& one : decided) changes.push_back(one.change);
-  MW_ASSIGN_OR_RETURN(std::vector<JobChangeResult> results, store_.ApplyChanges(changes, heartbeats, now));
-  for (const WorkerRecord& worker : heartbeats) written_workers_[worker.id] = worker;
-
-  std::set<std::string> news;
-  std::vector<JobChange> refused;
-  for (size_t i = 0; i < decided.size(); ++i) {
-    const JobChange& change = decided[i].change;
-    const OpenJob job = plan.jobs()[decided[i].job];
-    plan.ApplyOutcome(decided[i], results[i]);
-    if (results[i].status.ok() && change.kind == JobChange::Kind::kClaim) {
-      claimed_[{change.id, change.sequence}] = *std::move(results[i].job);
-    }
-    const bool is_result = change.kind == JobChange::Kind::kComplete || change.kind == JobChange::Kind::kSkipped;
-    if (is_result && results[i].status.ok()) news.insert(change.id);
-    // A result that the store does not take is a failure of the job; or nobody's any more, which the fence tells.
-    if (change.kind == JobChange::Kind::kComplete && !results[i].status.ok() && !job.lease_worker.empty()) {
-      refused.push_back(plan.FailureOf(
-          job, job.is_repair ? "made again, the result is another one" : std::string(results[i].status.message()),
-          false));
-    }
-  }
-  if (!refused.empty()) {
-    MW_RETURN_IF_ERROR(store_.ApplyChanges(refused, {}, now).status());
-    for (const JobChange& change : refused) news.insert(change.id);
-  }
-  for (const auto& [reconstruction, digest] : plan.damaged_blobs()) {
-    MW_RETURN_IF_ERROR(store_.ReportDamagedBlob(reconstruction, digest));
-    news.insert(reconstruction);
-  }
+void WorkerService::Tell(const std::set<std::string>& news) {
   std::function<void(const std::string&)> listener;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     listener = listener_;
   }
-  if (listener) {
-    for (const std::string& reconstruction : news) listener(reconstruction);
-  }
-  return absl::OkStatus();
+  if (!listener) return;
+  for (const std::string& reconstruction : news) listener(reconstruction);
 }
 
 std::vector<WorkerRecord> WorkerService::Heartbeats(const std::list<Call>& calls, absl::Time now) {
@@ -356,7 +322,7 @@ std::vector<WorkerRecord> WorkerService::Heartbeats(const std::list<Call>& calls
 
 absl::Status WorkerService::LookAtWorkers(absl::Time now) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     const bool is_due = now - last_look_at_workers_ >= std::min(lease_.lease / 4, kLookAtWorkers);
     if (!is_due && !workers_changed_) return absl::OkStatus();
     workers_changed_ = false;
@@ -383,13 +349,13 @@ absl::StatusOr<v1::CameraJob> WorkerService::FullJob(const OpenJob& job) {
     // Claimed by another coordinator, or by this one before it was started anew.
     MW_ASSIGN_OR_RETURN(stored, store_.GetCameraJob(job.reconstruction_id, job.sequence));
   }
-  MW_ASSIGN_OR_RETURN(const StoredJobSpec spec, DecodeJobSpec(stored.spec));
+  MW_ASSIGN_OR_RETURN(const CameraJobSpec spec, SpecOf(stored));
   MW_ASSIGN_OR_RETURN(const Background background, BackgroundOf(job.reconstruction_id));
   v1::CameraJob full;
   FillKey(job, *full.mutable_key());
-  full.set_camera(stored.camera);
-  full.set_snapshot(stored.snapshot);
-  full.mutable_neighbours()->Add(stored.neighbours.begin(), stored.neighbours.end());
+  full.set_camera(spec.camera);
+  full.set_snapshot(spec.snapshot);
+  full.mutable_neighbours()->Add(spec.neighbours.begin(), spec.neighbours.end());
   full.mutable_targets()->Add(spec.targets.begin(), spec.targets.end());
   for (const AcceptedSurface& accepted : spec.accepted) {
     v1::AcceptedSurface& surface = *full.add_accepted();
@@ -407,7 +373,7 @@ absl::StatusOr<v1::CameraJob> WorkerService::FullJob(const OpenJob& job) {
 
 absl::StatusOr<v1::SynchronizeResponse> WorkerService::AnswerTo(const Call& call,
                                                                 const std::vector<const OpenJob*>& held) {
-  const std::set<JobKey> known = RunningAt(call.request);
+  const std::set<JobKey> known = RunningAt(call.report);
   v1::SynchronizeResponse response;
   for (const OpenJob* const job : held) {
     if (known.count(KeyOf(*job)) > 0) {
@@ -421,29 +387,29 @@ absl::StatusOr<v1::SynchronizeResponse> WorkerService::AnswerTo(const Call& call
   return response;
 }
 
-void WorkerService::Publish(const SchedulingPass& plan, absl::Time now) {
+void WorkerService::Publish(const SchedulingPass& pass, absl::Time now) {
   std::set<std::pair<std::string, SequenceNumber>> leased;
-  for (const OpenJob& job : plan.jobs()) {
+  for (const OpenJob& job : pass.jobs()) {
     if (!job.lease_worker.empty()) leased.insert({job.reconstruction_id, job.sequence});
   }
   for (auto it = claimed_.begin(); it != claimed_.end();) {
     it = leased.count(it->first) > 0 ? std::next(it) : claimed_.erase(it);
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  seen_ = plan.jobs();
+  const MutexLock lock(mutex_);
+  seen_ = pass.jobs();
   workers_ = written_workers_;
   seen_at_ = now;
 }
 
 int WorkerService::LeasesIn(const std::string& reconstruction) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return static_cast<int>(std::count_if(seen_.begin(), seen_.end(), [&](const OpenJob& job) {
     return job.reconstruction_id == reconstruction && !job.lease_worker.empty();
   }));
 }
 
 std::vector<std::string> WorkerService::WarningsFor(const std::string& reconstruction) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   int64_t largest_worker = 0;
   for (const auto& [id, worker] : workers_) {
     const bool is_alive = seen_at_ - worker.last_heartbeat <= lease_.lease && !worker.draining && !worker.drained;
@@ -464,7 +430,7 @@ std::vector<std::string> WorkerService::WarningsFor(const std::string& reconstru
 }
 
 std::vector<v1::Attempt> WorkerService::RunningIn(const std::string& reconstruction) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<v1::Attempt> attempts;
   for (const OpenJob& job : seen_) {
     if (job.lease_worker.empty() || (!reconstruction.empty() && job.reconstruction_id != reconstruction)) continue;
@@ -476,7 +442,7 @@ std::vector<v1::Attempt> WorkerService::RunningIn(const std::string& reconstruct
 v1::ListWorkersResponse WorkerService::ListWorkers() const {
   std::map<std::string, WorkerRecord> workers;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     workers = workers_;
   }
   v1::ListWorkersResponse response;

@@ -1,13 +1,12 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <list>
 #include <map>
 #include <memory>
-#include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,13 +17,15 @@
 #include "meshwright/v1/reconstruction.pb.h"
 #include "meshwright/v1/worker.pb.h"
 
-#include "coordinator/dispatch/scheduling_pass.h"
+#include "common/base/mutex.h"
+#include "coordinator/scheduling/apply_pass.h"
+#include "coordinator/scheduling/scheduling_pass.h"
 #include "coordinator/store/job_store.h"
 
 namespace meshwright {
 
 // The coordinator's side of the worker protocol, without a network. Who holds which job is in the JobStore alone, so
-// any coordinator answers any worker. One thread takes turns: all calls that came since the turn before are answered
+// any coordinator answers any worker. One thread makes passes: all calls that came since the pass before are answered
 // from one look at the open jobs, and what they change is written in one transaction; calls that find nothing new wait
 // without a thread of their own. Thread-safe.
 class WorkerService {
@@ -50,13 +51,13 @@ class WorkerService {
 
   // There may be new jobs in the store.
   void Wake();
-  // Called after each turn with each reconstruction that has new results, or blobs that could not be read.
+  // Called after each pass with each reconstruction that has new results, or blobs that could not be read.
   void SetListener(std::function<void(const std::string& reconstruction)> listener);
 
   int LeasesIn(const std::string& reconstruction) const;
   // What blocks its jobs: none of the workers is large enough, or there is none.
   std::vector<std::string> WarningsFor(const std::string& reconstruction) const;
-  // Those of all coordinators, as of the last turns.
+  // Those of all coordinators, as of the last passes.
   v1::ListWorkersResponse ListWorkers() const;
   // What runs now, as attempts without ends; "" means of all reconstructions.
   std::vector<v1::Attempt> RunningIn(const std::string& reconstruction) const;
@@ -67,6 +68,7 @@ class WorkerService {
   struct Call {
     int64_t number = 0;
     v1::SynchronizeRequest request;
+    WorkerReport report;  // the same
     Answer answer;
     std::chrono::steady_clock::time_point deadline;
     bool is_heard = false;
@@ -79,15 +81,15 @@ class WorkerService {
   };
 
   void Run();
-  void Turn();
-  absl::Status TakeTurn(std::list<Call>& calls);
-  absl::Status Apply(SchedulingPass& plan, const std::vector<WorkerRecord>& heartbeats, absl::Time now);
+  void AnswerCalls();
+  absl::Status MakePass(std::list<Call>& calls);
+  void Tell(const std::set<std::string>& news);
   std::vector<WorkerRecord> Heartbeats(const std::list<Call>& calls, absl::Time now);
   absl::Status LookAtWorkers(absl::Time now);
   absl::StatusOr<v1::CameraJob> FullJob(const OpenJob& job);
   absl::StatusOr<Background> BackgroundOf(const std::string& reconstruction);
   absl::StatusOr<v1::SynchronizeResponse> AnswerTo(const Call& call, const std::vector<const OpenJob*>& held);
-  void Publish(const SchedulingPass& plan, absl::Time now);
+  void Publish(const SchedulingPass& pass, absl::Time now);
 
   const LeaseOptions lease_;
   const RetryOptions retry_;
@@ -97,22 +99,22 @@ class WorkerService {
   std::map<std::pair<std::string, SequenceNumber>, CameraJob> claimed_;  // jobs that are leased from here, with specs
   std::map<std::string, Background> backgrounds_;
   std::map<std::string, WorkerRecord> written_workers_;
-  absl::Time last_turn_ = absl::InfinitePast();
+  absl::Time last_pass_ = absl::InfinitePast();
   absl::Time silence_counts_from_ = absl::InfinitePast();
   absl::Time last_look_at_workers_ = absl::InfinitePast();
 
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  std::list<Call> calls_;  // that wait; taken out while a turn deals with them
-  std::vector<int64_t> abandoned_;
-  std::function<void(const std::string&)> listener_;
-  bool awake_ = false;
-  bool workers_changed_ = false;  // in the store, by other ways than heartbeats from here
-  bool stopping_ = false;
-  int64_t next_call_ = 1;
-  std::vector<OpenJob> seen_;  // as of the last turn
-  std::map<std::string, WorkerRecord> workers_;
-  absl::Time seen_at_ = absl::InfinitePast();
+  mutable Mutex mutex_;
+  ConditionVariable wake_;
+  std::list<Call> calls_ ABSL_GUARDED_BY(mutex_);  // that wait; taken out while a pass deals with them
+  std::vector<int64_t> abandoned_ ABSL_GUARDED_BY(mutex_);
+  std::function<void(const std::string&)> listener_ ABSL_GUARDED_BY(mutex_);
+  bool awake_ ABSL_GUARDED_BY(mutex_) = false;
+  bool workers_changed_ ABSL_GUARDED_BY(mutex_) = false;  // in the store, by other ways than heartbeats from here
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  int64_t next_call_ ABSL_GUARDED_BY(mutex_) = 1;
+  std::vector<OpenJob> seen_ ABSL_GUARDED_BY(mutex_);  // as of the last pass
+  std::map<std::string, WorkerRecord> workers_ ABSL_GUARDED_BY(mutex_);
+  absl::Time seen_at_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   std::thread thread_;
 };
 

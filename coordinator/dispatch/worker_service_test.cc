@@ -62,6 +62,7 @@ class WorkerServiceTest : public testing::Test {
     store_ = *OpenSqliteJobStore(folder_ + "/state.sqlite", &clock_);
     ASSERT_TRUE(
         store_->CreateReconstruction({.id = "a", .options_json = "{}", .scene_digest = kDigest}, clock_.Now()).ok());
+    epoch_ = *store_->AcquireConductorLease("a", "c", clock_.Now() + absl::Seconds(5), clock_.Now());
     service_ = std::make_unique<WorkerService>(kLease, RetryOptions{.backoff = absl::ZeroDuration()}, *store_);
     other_ = std::make_unique<WorkerService>(kLease, RetryOptions{.backoff = absl::ZeroDuration()}, *store_);
   }
@@ -74,13 +75,12 @@ class WorkerServiceTest : public testing::Test {
   void Offer(SequenceNumber sequence, int64_t memory_bytes = 10) {
     StoredJobSpec spec = {.targets = {2}, .memory_bytes = {memory_bytes, 5}};
     spec.accepted.push_back({.sequence = 1, .camera = 1, .digest = "d", .patches = 5});
-    const absl::Status assigned = store_->AssignCameraJob("a",
-                                                          {.sequence = sequence,
-                                                           .camera = 6 + sequence,
-                                                           .memory_bytes = memory_bytes,
-                                                           .neighbours = {1, 2},
-                                                           .spec = EncodeJobSpec(spec)},
-                                                          clock_.Now());
+    const CameraAssignment assignment = {.sequence = sequence,
+                                         .camera = 6 + sequence,
+                                         .memory_bytes = memory_bytes,
+                                         .neighbours = {1, 2},
+                                         .spec = EncodeJobSpec(spec)};
+    const absl::Status assigned = store_->Advance("a", {}, {assignment}, {}, clock_.Now(), epoch_);
     ASSERT_TRUE(assigned.ok()) << assigned;
   }
   static v1::SynchronizeResponse Synchronize(WorkerService& service, const v1::SynchronizeRequest& request) {
@@ -119,6 +119,7 @@ class WorkerServiceTest : public testing::Test {
   std::string folder_;
   SharedClock clock_;
   std::unique_ptr<JobStore> store_;
+  int64_t epoch_ = 0;  // of the lease of the reconstruction's conductor
   std::unique_ptr<WorkerService> service_;
   std::unique_ptr<WorkerService> other_;
 };
@@ -204,7 +205,7 @@ TEST_F(WorkerServiceTest, ACancelledReconstructionsJobsAreTakenAway) {
   Offer(1);
   v1::SynchronizeRequest request = Request("w");
   *request.add_held() = Held(Synchronize(request).jobs(0));
-  ASSERT_TRUE(store_->SetReconstructionState("a", ReconstructionState::kCancelled, clock_.Now()).ok());
+  ASSERT_TRUE(store_->RequestState("a", ReconstructionState::kCancelled, clock_.Now()).ok());
   EXPECT_EQ(Synchronize(request).jobs_size(), 0);
   EXPECT_EQ(service_->ListWorkers().workers_size(), 1);
   EXPECT_EQ(service_->LeasesIn("a"), 0);

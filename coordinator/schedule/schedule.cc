@@ -31,9 +31,9 @@ Schedule::Schedule(IncidenceMatrix matrix, OverlapGraph overlaps, const Schedule
 }
 
 absl::StatusOr<Schedule> Schedule::Replay(IncidenceMatrix matrix, OverlapGraph overlaps, const ScheduleOptions& options,
-                                          const std::vector<CommitRecord>& commits) {
+                                          const std::vector<JobOutcome>& commits) {
   Schedule schedule(std::move(matrix), std::move(overlaps), options);
-  for (const CommitRecord& commit : commits) MW_RETURN_IF_ERROR(schedule.Commit(commit));
+  for (const JobOutcome& commit : commits) MW_RETURN_IF_ERROR(schedule.Commit(commit));
   return schedule;
 }
 
@@ -46,7 +46,7 @@ std::vector<Assignment> Schedule::TakeChoices() {
   return choices;
 }
 
-absl::Status Schedule::Commit(const CommitRecord& commit) {
+absl::Status Schedule::Commit(const JobOutcome& commit) {
   if (in_flight_.empty() || commit.sequence != in_flight_.front().sequence) {
     return absl::InvalidArgumentError(absl::StrCat("commit ", commit.sequence, ": expected the next in order, ",
                                                    commits_ + 1,

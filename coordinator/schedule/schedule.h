@@ -33,7 +33,7 @@ struct Assignment {
 };
 
 // How a job ended; what has to be kept to replay a schedule.
-struct CommitRecord {
+struct JobOutcome {
   SequenceNumber sequence = 0;
   CameraIndex camera = 0;
   // Pairs (camera, t) to remove from the incidence matrix: fewer than m_S seeds (section 3.5). A camera that was set
@@ -41,7 +41,7 @@ struct CommitRecord {
   std::vector<CameraIndex> weak_targets;
   bool skipped = false;  // given up after repeated failures: the commit is empty, the schedule goes on
 
-  friend bool operator==(const CommitRecord&, const CommitRecord&) = default;
+  friend bool operator==(const JobOutcome&, const JobOutcome&) = default;
 };
 
 // The order rule: which reference camera is processed when, and on which snapshot of the accepted surface. A pure state
@@ -67,14 +67,14 @@ class Schedule {
   // The schedule after these commits, in order. TakeChoices() gives what is still in flight. InvalidArgument when they
   // are not commits of this schedule.
   static absl::StatusOr<Schedule> Replay(IncidenceMatrix matrix, OverlapGraph overlaps, const ScheduleOptions& options,
-                                         const std::vector<CommitRecord>& commits);
+                                         const std::vector<JobOutcome>& commits);
 
   // Cameras chosen since the last call, in sequence.
   std::vector<Assignment> TakeChoices();
 
-  // Ends the job `commit.sequence`, which must be commits() + 1 and in flight. InvalidArgument, and no change, when the
-  // record does not fit.
-  absl::Status Commit(const CommitRecord& commit);
+  // Ends the job `outcome.sequence`, which must be commits() + 1 and in flight. InvalidArgument, and no change, when
+  // the outcome does not fit.
+  absl::Status Commit(const JobOutcome& outcome);
 
   SequenceNumber commits() const { return commits_; }
   // Chosen and not committed, in sequence.

@@ -37,10 +37,10 @@ World RandomWorld(int cameras, double pair_share, double overlap_share, std::mt1
 }
 
 // What a camera's job would answer: a function of the assignment alone, as the real one is.
-CommitRecord Answer(const Assignment& assignment, double prune_share) {
+JobOutcome Answer(const Assignment& assignment, double prune_share) {
   std::mt19937 generator(static_cast<unsigned>(1000 * assignment.camera + assignment.snapshot));
   std::uniform_real_distribution<double> uniform(0, 1);
-  CommitRecord commit{.sequence = assignment.sequence, .camera = assignment.camera};
+  JobOutcome commit{.sequence = assignment.sequence, .camera = assignment.camera};
   for (const CameraIndex target : assignment.neighbours) {
     if (uniform(generator) < prune_share) commit.weak_targets.push_back(target);
   }
@@ -51,7 +51,7 @@ CommitRecord Answer(const Assignment& assignment, double prune_share) {
 
 struct History {
   std::vector<Assignment> assignments;
-  std::vector<CommitRecord> commits;
+  std::vector<JobOutcome> commits;
 };
 
 History RunInOrder(Schedule schedule, double prune_share) {
@@ -69,7 +69,7 @@ History RunInOrder(Schedule schedule, double prune_share) {
 History RunWithRandomCompletion(Schedule schedule, double prune_share, std::mt19937& generator) {
   History run;
   std::vector<Assignment> running;
-  std::map<SequenceNumber, CommitRecord> ended;
+  std::map<SequenceNumber, JobOutcome> ended;
   while (!schedule.finished()) {
     for (Assignment& assignment : schedule.TakeChoices()) {
       running.push_back(assignment);
@@ -153,8 +153,8 @@ TEST(Schedule, ReplayOfAnyPrefixGoesOnAlike) {
   const ScheduleOptions options{.window = 4, .max_overlap_in_flight = 1};
   const History expected = RunInOrder(Schedule(world.matrix, world.overlaps, options), 0.2);
   for (size_t prefix = 0; prefix <= expected.commits.size(); ++prefix) {
-    const std::vector<CommitRecord> known(expected.commits.begin(),
-                                          expected.commits.begin() + static_cast<std::ptrdiff_t>(prefix));
+    const std::vector<JobOutcome> known(expected.commits.begin(),
+                                        expected.commits.begin() + static_cast<std::ptrdiff_t>(prefix));
     absl::StatusOr<Schedule> replayed = Schedule::Replay(world.matrix, world.overlaps, options, known);
     ASSERT_TRUE(replayed.ok()) << replayed.status();
     const History rest = RunInOrder(*replayed, 0.2);

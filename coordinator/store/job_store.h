@@ -19,15 +19,15 @@ namespace meshwright {
 enum class ReconstructionState { kCreated, kPreparing, kRunning, kJoining, kDone, kCancelled, kFailed, kDeleting };
 
 // How far a reconstruction is.
-struct StoredProgress {
-  int64_t cameras_total = 0;
-  int64_t cameras_committed = 0;
+struct Progress {
+  int64_t cameras_total = 0;      // committed, in flight and still waiting; shrinks when pruning leaves one no pair
+  int64_t cameras_committed = 0;  // skipped ones included
   int64_t cameras_skipped = 0;
   int64_t cameras_in_flight = 0;
-  int64_t patches_filtered = 0;
+  int64_t patches_filtered = 0;  // over committed cameras
   int64_t patches_accepted = 0;
 
-  bool operator==(const StoredProgress&) const = default;
+  bool operator==(const Progress&) const = default;
 };
 
 struct StoredMesh {
@@ -50,7 +50,7 @@ struct Reconstruction {
   absl::Time created_at = absl::UnixEpoch();
   absl::Time finished_at = absl::InfinitePast();  // in a final state only
   StoredMesh mesh;
-  StoredProgress progress;
+  Progress progress;
 };
 
 // The life of a camera job: assigned -> done -> committed, or assigned -> skipped -> committed (with no surface).
@@ -242,7 +242,7 @@ struct Commit {
 // (Unavailable: or perhaps it has; every method may be repeated). Thread-safe. Time comes as a parameter; in a cluster
 // it is Now(), the one clock that all have in common.
 //
-// Writes of a conductor carry its epoch (AcquireConductorLease); 0 stands for a store that only one process writes to.
+// Whoever writes holds something: a conductor its reconstruction (AcquireConductorLease), a worker its jobs (kClaim).
 //
 // Errors: NotFound (no such reconstruction or job), AlreadyExists, Aborted (the epoch is an old one: drop the job, or
 // the reconstruction), FailedPrecondition (out of order, or contradicts what is stored), InvalidArgument (a value that
@@ -266,40 +266,39 @@ class JobStore {
                                                                             const std::string& after,
                                                                             int64_t limit) = 0;
   virtual absl::StatusOr<Usage> UsageOf(const std::string& owner) = 0;
+  // What a user asks for: preparing (start it) or cancelled. FailedPrecondition when it has another final state
+  // already.
+  virtual absl::Status RequestState(const std::string& id, ReconstructionState state, absl::Time now) = 0;
+
+  // Writes of the conductor, fenced by the epoch of its lease.
   // Gives a reconstruction that does not run yet its scene. Repeating it is OK; FailedPrecondition once it runs.
   virtual absl::Status SetReconstructionScene(const std::string& id, const std::string& scene_digest,
-                                              const std::string& scene_blob = "", int64_t conductor_epoch = 0) = 0;
+                                              const std::string& scene_blob, int64_t conductor_epoch) = 0;
   // FailedPrecondition when it has another final state already.
-  virtual absl::Status SetReconstructionState(const std::string& id, ReconstructionState state, absl::Time now,
-                                              const std::string& reason = "", int64_t conductor_epoch = 0) = 0;
+  virtual absl::Status SetReconstructionState(const std::string& id, ReconstructionState state,
+                                              const std::string& reason, absl::Time now, int64_t conductor_epoch) = 0;
   // Done, with its mesh.
   virtual absl::Status FinishReconstruction(const std::string& id, const StoredMesh& mesh, absl::Time now,
-                                            int64_t conductor_epoch = 0) = 0;
-  // From now on it is only there to be deleted. Repeating it is OK.
-  virtual absl::Status BeginDeletion(const std::string& id) = 0;
-  // Rows of it and its jobs and commits; its id stays taken. Deleting what is not there is harmless.
-  virtual absl::Status DeleteReconstruction(const std::string& id) = 0;
-
-  // Writes down that a camera was chosen, with epoch 1. Again with the same camera and snapshot: OK, nothing changes.
-  virtual absl::Status AssignCameraJob(const std::string& id, const CameraAssignment& assignment, absl::Time now,
-                                       int64_t conductor_epoch = 0) = 0;
-  // Hands an assigned job out again without a lease: its epoch grows by one and is returned.
-  virtual absl::StatusOr<int64_t> ReassignCameraJob(const std::string& id, SequenceNumber sequence, absl::Time now) = 0;
-  // The job's result; the blob must be durable already. Repeating it with the same digest is OK. A lease that ran out
-  // does not matter as long as nobody took the job over.
-  virtual absl::Status CompleteCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                         const std::string& filtered_digest,
-                                         const std::vector<CameraIndex>& weak_targets, const std::string& report_json,
-                                         absl::Time now) = 0;
-  // Gives the job up with a reason. Repeating it is OK; the first reason stays.
-  virtual absl::Status SkipCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                     const std::string& reason, absl::Time now) = 0;
+                                            int64_t conductor_epoch) = 0;
+  // Adds commits, each of which must be the next one, of jobs that are done or skipped; then the cameras chosen next,
+  // each with epoch 1; then how far it is now; all in one transaction. Accepted surfaces must be durable already.
+  // Repeating it is OK. When something is refused (FailedPrecondition: out of order, or contradicts what is stored),
+  // what stands before it may stay.
+  virtual absl::Status Advance(const std::string& id, const std::vector<Commit>& commits,
+                               const std::vector<CameraAssignment>& assignments, const Progress& progress,
+                               absl::Time now, int64_t conductor_epoch) = 0;
   // Takes a result back, so that the job is done again in a new epoch. With `expected_digest` since the blob is lost:
   // only the same result will do, and what failed before is forgotten. With "" since the result was none: one failure
   // more. Aborted when the job is not done in this epoch.
   virtual absl::Status ReopenCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
                                        const std::string& expected_digest, const std::string& reason,
-                                       absl::Time retry_at, int64_t conductor_epoch = 0) = 0;
+                                       absl::Time retry_at, int64_t conductor_epoch) = 0;
+
+  // From now on it is only there to be deleted. Repeating it is OK.
+  virtual absl::Status BeginDeletion(const std::string& id) = 0;
+  // Rows of it and its jobs and commits; its id stays taken. Deleting what is not there is harmless.
+  virtual absl::Status DeleteReconstruction(const std::string& id) = 0;
+
   virtual absl::StatusOr<CameraJob> GetCameraJob(const std::string& id, SequenceNumber sequence) = 0;
   // By sequence, those with a number greater than `after`, without their specs.
   virtual absl::StatusOr<std::vector<CameraJob>> ListCameraJobs(const std::string& id, SequenceNumber after = 0) = 0;
@@ -316,15 +315,6 @@ class JobStore {
   // The leases that ended, those that began last first. At most 16 of each job are kept.
   virtual absl::StatusOr<std::vector<Attempt>> ListAttempts(const std::string& id, int64_t limit) = 0;
 
-  // Adds commit number `commit.sequence`, which must be the next one, of a job that is done or skipped. The accepted
-  // surface must be durable already. Repeating the same commit is OK.
-  virtual absl::Status AddCommit(const std::string& id, const Commit& commit, absl::Time now,
-                                 int64_t conductor_epoch = 0) = 0;
-  // AddCommit for each, then AssignCameraJob for each and how far it is now, in one transaction. When one of them is
-  // refused, those before it may stand.
-  virtual absl::Status Advance(const std::string& id, const std::vector<Commit>& commits,
-                               const std::vector<CameraAssignment>& assignments, const StoredProgress& progress,
-                               absl::Time now, int64_t conductor_epoch = 0) = 0;
   // By sequence, at most `limit` of those with a number greater than `after`.
   virtual absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after = 0,
                                                           int64_t limit = std::numeric_limits<int64_t>::max()) = 0;

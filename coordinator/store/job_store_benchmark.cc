@@ -32,7 +32,10 @@ class TestStore {
       store_ = *OpenSqliteJobStore(folder_ + "/state.sqlite");
     }
     MW_CHECK(store_->CreateReconstruction({"castle", "{}", std::string(64, '0')}, kNow).ok());
-    for (int s = 1; s <= kJobs; ++s) MW_CHECK(store_->AssignCameraJob("castle", {s, s, 0}, kNow).ok());
+    const int64_t epoch = *store_->AcquireConductorLease("castle", "c", kNow + absl::Seconds(5), kNow);
+    std::vector<CameraAssignment> cameras;
+    for (int s = 1; s <= kJobs; ++s) cameras.push_back({s, s, 0});
+    MW_CHECK(store_->Advance("castle", {}, cameras, {}, kNow, epoch).ok());
   }
   ~TestStore() {
     store_.reset();
@@ -93,22 +96,25 @@ BENCHMARK(ListOpenJobs)->ArgName("postgres")->Arg(0)->Arg(1)->UseRealTime();
 void WholeLife(benchmark::State& state) {
   TestStore store(state.range(0) == 1);
   MW_CHECK((*store).CreateReconstruction({"abbey", "{}", std::string(64, '0')}, kNow).ok());
+  const int64_t epoch = *(*store).AcquireConductorLease("abbey", "c", kNow + absl::Seconds(5), kNow);
+  std::vector<Commit> commits;
   SequenceNumber s = 0;
   for (auto _ : state) {
     ++s;
-    MW_CHECK((*store).AssignCameraJob("abbey", {s, s, 0}, kNow).ok());
-    MW_CHECK((*store)
-                 .ApplyChanges({{.kind = JobChange::Kind::kClaim,
-                                 .id = "abbey",
-                                 .sequence = s,
-                                 .epoch = 1,
-                                 .worker = "w",
-                                 .expires_at = kNow + absl::Seconds(30)}},
-                               {}, kNow)
-                 ->front()
-                 .status.ok());
-    MW_CHECK((*store).CompleteCameraJob("abbey", s, 2, std::string(64, 'a'), {}, R"({"seeds":9})", kNow).ok());
-    MW_CHECK((*store).AddCommit("abbey", {s, s, std::string(64, 'b'), 9, 4}, kNow).ok());
+    MW_CHECK((*store).Advance("abbey", commits, {{s, s, s - 1}}, {}, kNow, epoch).ok());
+    JobChange change = {.kind = JobChange::Kind::kClaim,
+                        .id = "abbey",
+                        .sequence = s,
+                        .epoch = 1,
+                        .worker = "w",
+                        .expires_at = kNow + absl::Seconds(30),
+                        .filtered_digest = std::string(64, 'a'),
+                        .report_json = R"({"seeds":9})"};
+    MW_CHECK((*store).ApplyChanges({change}, {}, kNow)->front().status.ok());
+    change.kind = JobChange::Kind::kComplete;
+    change.epoch = 2;
+    MW_CHECK((*store).ApplyChanges({change}, {}, kNow)->front().status.ok());
+    commits = {{s, s, std::string(64, 'b'), 9, 4}};
   }
   state.SetItemsProcessed(state.iterations());
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -44,9 +45,28 @@ class JobStoreConformance : public testing::TestWithParam<JobStoreFactory> {
 
   static std::string Digest(char letter) { return std::string(64, letter); }
 
+  // Of a conductor's lease, which is taken at the first call.
+  int64_t Conduct(const std::string& id) {
+    const auto found = epochs_.find(id);
+    if (found != epochs_.end()) return found->second;
+    return epochs_[id] = store().AcquireConductorLease(id, "north", kNow + kLease, kNow).value_or(1);
+  }
+  absl::Status Assign(const std::string& id, const CameraAssignment& assignment) {
+    return store().Advance(id, {}, {assignment}, {}, kNow, Conduct(id));
+  }
+  absl::Status AddCommit(const std::string& id, const Commit& commit) {
+    return store().Advance(id, {commit}, {}, {}, kNow, Conduct(id));
+  }
+  absl::Status SetState(const std::string& id, ReconstructionState state, const std::string& reason = "") {
+    return store().SetReconstructionState(id, state, reason, kNow, Conduct(id));
+  }
+  absl::Status SetScene(const std::string& id, const std::string& digest) {
+    return store().SetReconstructionScene(id, digest, "", Conduct(id));
+  }
+
   // Cameras 1 .. count as jobs 1 .. count.
   void AssignJobs(const std::string& id, int count) {
-    for (int s = 1; s <= count; ++s) ASSERT_TRUE(store().AssignCameraJob(id, {s, s, 0}, kNow).ok());
+    for (int s = 1; s <= count; ++s) ASSERT_TRUE(Assign(id, {s, s, 0}).ok());
   }
 
   // A change of castle's job `sequence` as `worker` would make it.
@@ -75,10 +95,22 @@ class JobStoreConformance : public testing::TestWithParam<JobStoreFactory> {
     change.reason = reason;
     return Apply(change).status;
   }
-  absl::Status Complete(SequenceNumber sequence, int64_t epoch, const std::string& digest) {
+  absl::Status Complete(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& digest,
+                        const std::vector<CameraIndex>& weak_targets = {}, const std::string& report_json = "{}") {
     JobChange change = ChangeOf(JobChange::Kind::kComplete, sequence, epoch, "");
+    change.id = id;
     change.filtered_digest = digest;
-    change.report_json = "{}";
+    change.weak_targets = weak_targets;
+    change.report_json = report_json;
+    return Apply(change).status;
+  }
+  absl::Status Complete(SequenceNumber sequence, int64_t epoch, const std::string& digest) {
+    return Complete("castle", sequence, epoch, digest);
+  }
+  absl::Status Skip(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason) {
+    JobChange change = ChangeOf(JobChange::Kind::kSkipped, sequence, epoch, "");
+    change.id = id;
+    change.reason = reason;
     return Apply(change).status;
   }
 
@@ -88,6 +120,7 @@ class JobStoreConformance : public testing::TestWithParam<JobStoreFactory> {
       .id = "castle", .options_json = R"({"window":3})", .scene_digest = std::string(64, '0')};
 
   JobStoreFixture fixture_;
+  std::map<std::string, int64_t> epochs_;
 };
 
 TEST_P(JobStoreConformance, ReconstructionsSurviveReopening) {
@@ -98,7 +131,7 @@ TEST_P(JobStoreConformance, ReconstructionsSurviveReopening) {
   EXPECT_EQ(stored->scene_digest, kReconstruction.scene_digest);
   EXPECT_EQ(stored->state, ReconstructionState::kRunning);
 
-  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kDone, kNow).ok());
+  ASSERT_TRUE(SetState("castle", ReconstructionState::kDone).ok());
   Reopen();
   EXPECT_EQ(store().GetReconstruction("castle")->state, ReconstructionState::kDone);
 }
@@ -174,33 +207,34 @@ TEST_P(JobStoreConformance, ReconstructionIdsAreUnique) {
 
 TEST_P(JobStoreConformance, UnknownReconstructionsAreNotFound) {
   EXPECT_TRUE(absl::IsNotFound(store().GetReconstruction("ruin").status()));
-  EXPECT_TRUE(absl::IsNotFound(store().SetReconstructionState("ruin", ReconstructionState::kDone, kNow)));
-  EXPECT_FALSE(store().AssignCameraJob("ruin", {1, 0, 0}, kNow).ok());
-  EXPECT_TRUE(absl::IsNotFound(store().CompleteCameraJob("ruin", 1, 1, Digest('a'), {}, "{}", kNow)));
+  EXPECT_FALSE(SetState("ruin", ReconstructionState::kDone).ok());
+  EXPECT_FALSE(Assign("ruin", {1, 0, 0}).ok());
+  EXPECT_TRUE(absl::IsNotFound(store().RequestState("ruin", ReconstructionState::kCancelled, kNow)));
+  EXPECT_TRUE(absl::IsAborted(Complete("ruin", 1, 1, Digest('a'))));
 }
 
 TEST_P(JobStoreConformance, ValuesThatBreakAnInvariantAreRefused) {
   EXPECT_FALSE(store().CreateReconstruction({"", "{}", Digest('1')}, kNow).ok());
   EXPECT_FALSE(store().CreateReconstruction({"x", "not json", Digest('1')}, kNow).ok());
   EXPECT_FALSE(store().CreateReconstruction({"x", "{}", "short"}, kNow).ok());
-  EXPECT_FALSE(store().AssignCameraJob("castle", {0, 1, 0}, kNow).ok());   // sequences begin at 1
-  EXPECT_FALSE(store().AssignCameraJob("castle", {1, -1, 0}, kNow).ok());  // no such camera
-  EXPECT_FALSE(store().AssignCameraJob("castle", {2, 1, 2}, kNow).ok());   // sees itself
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 4, 0}, kNow).ok());
-  EXPECT_FALSE(store().CompleteCameraJob("castle", 1, 1, "short", {}, "{}", kNow).ok());
-  EXPECT_FALSE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "not json", kNow).ok());
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
-  EXPECT_FALSE(store().AddCommit("castle", {1, 4, Digest('b'), 5, 6}, kNow).ok());  // more accepted than filtered
-  EXPECT_FALSE(store().AddCommit("castle", {1, 4, "", 5, 5}, kNow).ok());           // accepted, but where?
-  EXPECT_FALSE(store().AddCommit("castle", {1, 9, Digest('b'), 5, 5}, kNow).ok());  // another camera
+  EXPECT_FALSE(Assign("castle", {0, 1, 0}).ok());   // sequences begin at 1
+  EXPECT_FALSE(Assign("castle", {1, -1, 0}).ok());  // no such camera
+  EXPECT_FALSE(Assign("castle", {2, 1, 2}).ok());   // sees itself
+  ASSERT_TRUE(Assign("castle", {1, 4, 0}).ok());
+  EXPECT_FALSE(Complete("castle", 1, 1, "short").ok());
+  EXPECT_FALSE(Complete("castle", 1, 1, Digest('a'), {}, "not json").ok());
+  ASSERT_TRUE(Complete("castle", 1, 1, Digest('a')).ok());
+  EXPECT_FALSE(AddCommit("castle", {1, 4, Digest('b'), 5, 6}).ok());  // more accepted than filtered
+  EXPECT_FALSE(AddCommit("castle", {1, 4, "", 5, 5}).ok());           // accepted, but where?
+  EXPECT_FALSE(AddCommit("castle", {1, 9, Digest('b'), 5, 5}).ok());  // another camera
   EXPECT_TRUE(store().ListCommits("castle")->empty());
 }
 
 TEST_P(JobStoreConformance, AssignmentsAreIdempotentAndContradictionsRefused) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
-  EXPECT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().AssignCameraJob("castle", {1, 8, 0}, kNow)));
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().AssignCameraJob("castle", {2, 7, 0}, kNow)));  // one job a camera
+  ASSERT_TRUE(Assign("castle", {1, 7, 0}).ok());
+  EXPECT_TRUE(Assign("castle", {1, 7, 0}).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(Assign("castle", {1, 8, 0})));
+  EXPECT_TRUE(absl::IsFailedPrecondition(Assign("castle", {2, 7, 0})));  // one job a camera
   const auto jobs = store().ListCameraJobs("castle");
   ASSERT_EQ(jobs->size(), 1);
   EXPECT_EQ(jobs->at(0).camera, 7);
@@ -209,10 +243,10 @@ TEST_P(JobStoreConformance, AssignmentsAreIdempotentAndContradictionsRefused) {
 }
 
 TEST_P(JobStoreConformance, ResultsSurviveReopening) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("castle", {2, 3, 0}, kNow).ok());
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 2, 1, Digest('a'), {4, 11}, R"({"seeds":9})", kNow).ok());
-  ASSERT_TRUE(store().SkipCameraJob("castle", 1, 1, "picture is gone", kNow).ok());
+  ASSERT_TRUE(Assign("castle", {1, 7, 0}).ok());
+  ASSERT_TRUE(Assign("castle", {2, 3, 0}).ok());
+  ASSERT_TRUE(Complete("castle", 2, 1, Digest('a'), {4, 11}, R"({"seeds":9})").ok());
+  ASSERT_TRUE(Skip("castle", 1, 1, "picture is gone").ok());
   Reopen();
   const auto jobs = store().ListCameraJobs("castle");
   ASSERT_TRUE(jobs.ok());
@@ -226,41 +260,40 @@ TEST_P(JobStoreConformance, ResultsSurviveReopening) {
 }
 
 TEST_P(JobStoreConformance, AnOldEpochMayNotWrite) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
-  const auto epoch = store().ReassignCameraJob("castle", 1, kNow);
-  ASSERT_TRUE(epoch.ok()) << epoch.status();
-  EXPECT_EQ(*epoch, 2);
-  EXPECT_TRUE(absl::IsAborted(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow)));
-  EXPECT_TRUE(absl::IsAborted(store().SkipCameraJob("castle", 1, 1, "slow", kNow)));
+  ASSERT_TRUE(Assign("castle", {1, 7, 0}).ok());
+  ASSERT_EQ(Claim(1, 1, "ant").job->epoch, 2);
+  EXPECT_TRUE(absl::IsAborted(Complete(1, 1, Digest('a'))));
+  EXPECT_TRUE(absl::IsAborted(Skip("castle", 1, 1, "slow")));
   EXPECT_EQ(store().ListCameraJobs("castle")->at(0).state, CameraJobState::kAssigned);
-  EXPECT_TRUE(store().CompleteCameraJob("castle", 1, 2, Digest('b'), {}, "{}", kNow).ok());
+  EXPECT_TRUE(Complete(1, 2, Digest('b')).ok());
   // Finished jobs are not handed out any more, and who comes late learns that it may drop its work.
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().ReassignCameraJob("castle", 1, kNow).status()));
-  EXPECT_TRUE(absl::IsAborted(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow)));
+  EXPECT_TRUE(absl::IsAborted(Claim(1, 2, "ant").status));
+  EXPECT_TRUE(absl::IsAborted(Complete(1, 1, Digest('a'))));
   EXPECT_EQ(store().ListCameraJobs("castle")->at(0).filtered_digest, Digest('b'));
 }
 
-TEST_P(JobStoreConformance, RepeatedResultsAreHarmless) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
-  EXPECT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().CompleteCameraJob("castle", 1, 1, Digest('b'), {}, "{}", kNow)));
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().SkipCameraJob("castle", 1, 1, "slow", kNow)));
+TEST_P(JobStoreConformance, TheFirstResultStays) {
+  ASSERT_TRUE(Assign("castle", {1, 7, 0}).ok());
+  ASSERT_TRUE(Complete(1, 1, Digest('a')).ok());
+  EXPECT_TRUE(absl::IsAborted(Complete(1, 1, Digest('a'))));
+  EXPECT_TRUE(absl::IsAborted(Complete(1, 1, Digest('b'))));
+  EXPECT_TRUE(absl::IsAborted(Skip("castle", 1, 1, "slow")));
+  EXPECT_EQ(store().GetCameraJob("castle", 1)->filtered_digest, Digest('a'));
 }
 
 TEST_P(JobStoreConformance, CommitsComeInOrderOnceAndOfFinishedJobs) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("castle", {2, 3, 0}, kNow).ok());
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 2, 1, Digest('a'), {}, "{}", kNow).ok());
+  ASSERT_TRUE(Assign("castle", {1, 7, 0}).ok());
+  ASSERT_TRUE(Assign("castle", {2, 3, 0}).ok());
+  ASSERT_TRUE(Complete("castle", 2, 1, Digest('a')).ok());
   const Commit first = {1, 7, "", 0, 0};
   const Commit second = {2, 3, Digest('b'), 9, 4};
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().AddCommit("castle", second, kNow)));  // 1 is missing
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().AddCommit("castle", first, kNow)));   // not finished
-  ASSERT_TRUE(store().SkipCameraJob("castle", 1, 1, "gone", kNow).ok());
-  EXPECT_TRUE(store().AddCommit("castle", first, kNow).ok());
-  EXPECT_TRUE(store().AddCommit("castle", second, kNow).ok());
-  EXPECT_TRUE(store().AddCommit("castle", second, kNow).ok());  // again: harmless
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().AddCommit("castle", {2, 3, Digest('c'), 9, 4}, kNow)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(AddCommit("castle", second)));  // 1 is missing
+  EXPECT_TRUE(absl::IsFailedPrecondition(AddCommit("castle", first)));   // not finished
+  ASSERT_TRUE(Skip("castle", 1, 1, "gone").ok());
+  EXPECT_TRUE(AddCommit("castle", first).ok());
+  EXPECT_TRUE(AddCommit("castle", second).ok());
+  EXPECT_TRUE(AddCommit("castle", second).ok());  // again: harmless
+  EXPECT_TRUE(absl::IsFailedPrecondition(AddCommit("castle", {2, 3, Digest('c'), 9, 4})));
   Reopen();
   const auto commits = store().ListCommits("castle");
   ASSERT_TRUE(commits.ok());
@@ -269,8 +302,8 @@ TEST_P(JobStoreConformance, CommitsComeInOrderOnceAndOfFinishedJobs) {
 
 TEST_P(JobStoreConformance, ReconstructionsDoNotSeeEachOther) {
   ASSERT_TRUE(store().CreateReconstruction({"abbey", "{}", Digest('1')}, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("abbey", {1, 2, 0}, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow).ok());
+  ASSERT_TRUE(Assign("abbey", {1, 2, 0}).ok());
+  ASSERT_TRUE(Assign("castle", {1, 7, 0}).ok());
   EXPECT_EQ(store().ListCameraJobs("abbey")->at(0).camera, 2);
   EXPECT_EQ(store().ListCameraJobs("castle")->at(0).camera, 7);
 }
@@ -278,7 +311,7 @@ TEST_P(JobStoreConformance, ReconstructionsDoNotSeeEachOther) {
 TEST_P(JobStoreConformance, ManyThreadsGetOneWinnerEach) {
   constexpr int kJobs = 8;
   constexpr int kThreads = 4;
-  for (int s = 1; s <= kJobs; ++s) ASSERT_TRUE(store().AssignCameraJob("castle", {s, s, 0}, kNow).ok());
+  for (int s = 1; s <= kJobs; ++s) ASSERT_TRUE(Assign("castle", {s, s, 0}).ok());
   std::vector<int> won(kThreads, 0);
   std::vector<std::thread> threads;
   threads.reserve(kThreads);
@@ -286,7 +319,7 @@ TEST_P(JobStoreConformance, ManyThreadsGetOneWinnerEach) {
     threads.emplace_back([&, t] {
       for (int s = 1; s <= kJobs; ++s) {
         const std::string digest = Digest(static_cast<char>('a' + t));
-        if (store().CompleteCameraJob("castle", s, 1, digest, {}, "{}", kNow).ok()) ++won[static_cast<size_t>(t)];
+        if (Complete("castle", s, 1, digest).ok()) ++won[static_cast<size_t>(t)];
       }
     });
   }
@@ -305,7 +338,7 @@ TEST_P(JobStoreConformance, TheStoreHasAClock) {
 }
 
 TEST_P(JobStoreConformance, AJobIsLeasedToOneWorkerInANewEpoch) {
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0, 5, {2, 9}, "what to do"}, kNow).ok());
+  ASSERT_TRUE(Assign("castle", {1, 7, 0, 5, {2, 9}, "what to do"}).ok());
   const JobChangeResult claimed = Claim(1, 1, "ant");
   ASSERT_TRUE(claimed.status.ok() && claimed.job.has_value()) << claimed.status;
   EXPECT_EQ(claimed.job->epoch, 2);
@@ -332,9 +365,9 @@ TEST_P(JobStoreConformance, OpenJobsAreThoseOfReconstructionsThatRun) {
       store()
           .CreateReconstruction({.id = "abbey", .options_json = "{}", .scene_digest = Digest('1'), .weight = 2.5}, kNow)
           .ok());
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0, 5'000'000'000}, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("castle", {2, 3, 0}, kNow).ok());
-  ASSERT_TRUE(store().AssignCameraJob("abbey", {1, 4, 0}, kNow).ok());
+  ASSERT_TRUE(Assign("castle", {1, 7, 0, 5'000'000'000}).ok());
+  ASSERT_TRUE(Assign("castle", {2, 3, 0}).ok());
+  ASSERT_TRUE(Assign("abbey", {1, 4, 0}).ok());
   ASSERT_TRUE(Claim(2, 1, "ant").status.ok());
   const auto open = store().ListOpenJobs();
   ASSERT_TRUE(open.ok()) << open.status();
@@ -347,7 +380,7 @@ TEST_P(JobStoreConformance, OpenJobsAreThoseOfReconstructionsThatRun) {
   EXPECT_EQ(open->at(2).lease_worker, "ant");
   EXPECT_EQ(open->at(2).lease_expires_at, kNow + kLease);
   EXPECT_EQ(open->at(2).epoch, 2);
-  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kCancelled, kNow, "by its owner").ok());
+  ASSERT_TRUE(store().RequestState("castle", ReconstructionState::kCancelled, kNow).ok());
   ASSERT_EQ(store().ListOpenJobs()->size(), 1);
 }
 
@@ -489,11 +522,13 @@ TEST_P(JobStoreConformance, AResultThatIsLostIsMadeAgainAndMustBeTheSame) {
   AssignJobs("castle", 1);
   ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
   ASSERT_TRUE(End(JobChange::Kind::kFail, 1, 2, "ant", "crash").ok());
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 2, Digest('a'), {3}, "{}", kNow).ok());
-  ASSERT_TRUE(store().AddCommit("castle", {1, 1, Digest('b'), 9, 4}, kNow).ok());
-  EXPECT_TRUE(absl::IsAborted(store().ReopenCameraJob("castle", 1, 1, Digest('a'), "damaged", kNow)));
-  ASSERT_TRUE(store().ReopenCameraJob("castle", 1, 2, Digest('a'), "damaged", kNow).ok());
-  EXPECT_TRUE(absl::IsAborted(store().ReopenCameraJob("castle", 1, 2, Digest('a'), "damaged", kNow)));
+  ASSERT_TRUE(Complete("castle", 1, 2, Digest('a'), {3}, "{}").ok());
+  ASSERT_TRUE(AddCommit("castle", {1, 1, Digest('b'), 9, 4}).ok());
+  EXPECT_TRUE(
+      absl::IsAborted(store().ReopenCameraJob("castle", 1, 1, Digest('a'), "damaged", kNow, Conduct("castle"))));
+  ASSERT_TRUE(store().ReopenCameraJob("castle", 1, 2, Digest('a'), "damaged", kNow, Conduct("castle")).ok());
+  EXPECT_TRUE(
+      absl::IsAborted(store().ReopenCameraJob("castle", 1, 2, Digest('a'), "damaged", kNow, Conduct("castle"))));
   const auto open = store().ListOpenJobs();
   ASSERT_EQ(open->size(), 1);
   EXPECT_TRUE(open->at(0).is_repair);
@@ -510,15 +545,15 @@ TEST_P(JobStoreConformance, AResultThatIsLostIsMadeAgainAndMustBeTheSame) {
 
 TEST_P(JobStoreConformance, AResultThatIsNoneIsTakenBack) {
   AssignJobs("castle", 1);
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
-  ASSERT_TRUE(store().ReopenCameraJob("castle", 1, 1, "", "no surface", kNow + kLease).ok());
+  ASSERT_TRUE(Complete("castle", 1, 1, Digest('a')).ok());
+  ASSERT_TRUE(store().ReopenCameraJob("castle", 1, 1, "", "no surface", kNow + kLease, Conduct("castle")).ok());
   const auto open = store().ListOpenJobs();
   ASSERT_EQ(open->size(), 1);
   EXPECT_FALSE(open->at(0).is_repair);
   EXPECT_EQ(open->at(0).failed_attempts, 1);
   EXPECT_EQ(open->at(0).not_before, kNow + kLease);
   EXPECT_TRUE(store().ListResults("castle")->empty());
-  ASSERT_TRUE(store().SkipCameraJob("castle", 1, 2, "no surface", kNow).ok());
+  ASSERT_TRUE(Skip("castle", 1, 2, "no surface").ok());
   ASSERT_EQ(store().ListResults("castle")->size(), 1);
   EXPECT_TRUE(store().ListResults("castle")->at(0).skipped);
   EXPECT_TRUE(store().ListResults("castle", 1)->empty());
@@ -585,20 +620,30 @@ TEST_P(JobStoreConformance, AReconstructionHasOneConductorAtATime) {
 
 TEST_P(JobStoreConformance, OnlyTheConductorWrites) {
   ASSERT_EQ(*store().AcquireConductorLease("castle", "north", kNow + kLease, kNow), 1);
-  ASSERT_TRUE(store().AssignCameraJob("castle", {1, 7, 0}, kNow, 1).ok());
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
+  const auto advance = [&](const std::vector<Commit>& commits, const std::vector<CameraAssignment>& chosen,
+                           int64_t epoch) { return store().Advance("castle", commits, chosen, {}, kNow, epoch); };
+  ASSERT_TRUE(advance({}, {{1, 7, 0}}, 1).ok());
+  ASSERT_TRUE(Complete(1, 1, Digest('a')).ok());
   ASSERT_EQ(*store().AcquireConductorLease("castle", "south", kNow + 3 * kLease, kNow + 2 * kLease), 2);
   const Commit commit = {1, 7, Digest('b'), 9, 4};
-  EXPECT_TRUE(absl::IsAborted(store().AddCommit("castle", commit, kNow, 1)));
-  EXPECT_TRUE(absl::IsAborted(store().AssignCameraJob("castle", {2, 8, 0}, kNow, 1)));
-  EXPECT_TRUE(absl::IsAborted(store().AssignCameraJob("castle", {1, 7, 0}, kNow, 1)));
-  EXPECT_TRUE(absl::IsAborted(store().SetReconstructionState("castle", ReconstructionState::kDone, kNow, "", 1)));
+  const auto finish = [&](int64_t epoch) {
+    return store().SetReconstructionState("castle", ReconstructionState::kDone, "", kNow, epoch);
+  };
+  for (const int64_t epoch : {0, 1, 3}) {
+    EXPECT_TRUE(absl::IsAborted(advance({commit}, {}, epoch)));
+    EXPECT_TRUE(absl::IsAborted(advance({}, {{2, 8, 0}}, epoch)));
+    EXPECT_TRUE(absl::IsAborted(advance({}, {{1, 7, 0}}, epoch)));
+    EXPECT_TRUE(absl::IsAborted(advance({}, {}, epoch)));
+    EXPECT_TRUE(absl::IsAborted(finish(epoch)));
+    EXPECT_TRUE(absl::IsAborted(store().FinishReconstruction("castle", {Digest('m'), 5, 6, 7}, kNow, epoch)));
+    EXPECT_TRUE(absl::IsAborted(store().ReopenCameraJob("castle", 1, 1, "", "none", kNow, epoch)));
+  }
   EXPECT_TRUE(store().ListCommits("castle")->empty());
   EXPECT_EQ(store().ListCameraJobs("castle")->size(), 1);
-  EXPECT_TRUE(store().AddCommit("castle", commit, kNow, 2).ok());
-  EXPECT_TRUE(store().AddCommit("castle", commit, kNow, 2).ok());
-  EXPECT_TRUE(store().AssignCameraJob("castle", {2, 8, 0}, kNow, 2).ok());
-  EXPECT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kDone, kNow, "", 2).ok());
+  EXPECT_TRUE(advance({commit}, {}, 2).ok());
+  EXPECT_TRUE(advance({commit}, {}, 2).ok());
+  EXPECT_TRUE(advance({}, {{2, 8, 0}}, 2).ok());
+  EXPECT_TRUE(finish(2).ok());
   EXPECT_TRUE(store().ListConducted()->empty());
   EXPECT_THAT(*store().ListCommits("castle"), testing::ElementsAre(commit));
 }
@@ -622,11 +667,11 @@ TEST_P(JobStoreConformance, NobodyConductsInVainWhenManyTry) {
 
 TEST_P(JobStoreConformance, CommitsAndChoicesAdvanceTogether) {
   ASSERT_EQ(*store().AcquireConductorLease("castle", "north", kNow + kLease, kNow), 1);
-  StoredProgress progress = {.cameras_total = 9, .cameras_in_flight = 2};
+  Progress progress = {.cameras_total = 9, .cameras_in_flight = 2};
   ASSERT_TRUE(store().Advance("castle", {}, {{1, 7, 0, 5}, {2, 3, 0, 6}}, progress, kNow, 1).ok());
   ASSERT_TRUE(store().Advance("castle", {}, {}, progress, kNow, 1).ok());
   for (int s = 1; s <= 2; ++s) {
-    ASSERT_TRUE(store().CompleteCameraJob("castle", s, 1, Digest('a'), {}, "{}", kNow).ok());
+    ASSERT_TRUE(Complete("castle", s, 1, Digest('a')).ok());
   }
   const std::vector<Commit> commits = {{1, 7, Digest('b'), 9, 4}, {2, 3, "", 0, 0}};
   const std::vector<CameraAssignment> choices = {{3, 5, 2, 0}};
@@ -659,22 +704,20 @@ TEST_P(JobStoreConformance, AReconstructionRunsOnceItsSceneIsThere) {
                                         kNow)
                   .ok());
   EXPECT_EQ(store().GetReconstruction("abbey")->weight, 3);
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().SetReconstructionState("abbey", ReconstructionState::kRunning, kNow)));
-  EXPECT_TRUE(store().SetReconstructionScene("abbey", Digest('1')).ok());
-  EXPECT_TRUE(store().SetReconstructionScene("abbey", Digest('2')).ok());
-  EXPECT_TRUE(store().SetReconstructionState("abbey", ReconstructionState::kRunning, kNow).ok());
-  EXPECT_TRUE(store().SetReconstructionScene("abbey", Digest('2')).ok());
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().SetReconstructionScene("abbey", Digest('3'))));
-  EXPECT_TRUE(absl::IsNotFound(store().SetReconstructionScene("ruin", Digest('3'))));
+  EXPECT_TRUE(absl::IsFailedPrecondition(SetState("abbey", ReconstructionState::kRunning)));
+  EXPECT_TRUE(SetScene("abbey", Digest('1')).ok());
+  EXPECT_TRUE(SetScene("abbey", Digest('2')).ok());
+  EXPECT_TRUE(SetState("abbey", ReconstructionState::kRunning).ok());
+  EXPECT_TRUE(SetScene("abbey", Digest('2')).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(SetScene("abbey", Digest('3'))));
   EXPECT_EQ(store().GetReconstruction("abbey")->scene_digest, Digest('2'));
 }
 
 TEST_P(JobStoreConformance, FinalStatesStay) {
-  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kFailed, kNow, "no pair is feasible").ok());
-  EXPECT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kFailed, kNow, "again").ok());
-  EXPECT_TRUE(
-      absl::IsFailedPrecondition(store().SetReconstructionState("castle", ReconstructionState::kRunning, kNow)));
-  EXPECT_TRUE(absl::IsFailedPrecondition(store().SetReconstructionState("castle", ReconstructionState::kDone, kNow)));
+  ASSERT_TRUE(SetState("castle", ReconstructionState::kFailed, "no pair is feasible").ok());
+  EXPECT_TRUE(SetState("castle", ReconstructionState::kFailed, "again").ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(SetState("castle", ReconstructionState::kRunning)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(SetState("castle", ReconstructionState::kDone)));
   EXPECT_EQ(store().GetReconstruction("castle")->state, ReconstructionState::kFailed);
   EXPECT_EQ(store().GetReconstruction("castle")->state_reason, "no pair is feasible");
 }
@@ -682,8 +725,8 @@ TEST_P(JobStoreConformance, FinalStatesStay) {
 TEST_P(JobStoreConformance, DeletingTakesEverythingAlong) {
   AssignJobs("castle", 2);
   ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
-  ASSERT_TRUE(store().SkipCameraJob("castle", 1, 2, "gone", kNow).ok());
-  ASSERT_TRUE(store().AddCommit("castle", {1, 1, "", 0, 0}, kNow).ok());
+  ASSERT_TRUE(Skip("castle", 1, 2, "gone").ok());
+  ASSERT_TRUE(AddCommit("castle", {1, 1, "", 0, 0}).ok());
   ASSERT_TRUE(store().AcquireConductorLease("castle", "north", kNow + kLease, kNow).ok());
   EXPECT_TRUE(store().DeleteReconstruction("castle").ok());
   EXPECT_TRUE(store().DeleteReconstruction("castle").ok());
@@ -708,8 +751,8 @@ TEST_P(JobStoreConformance, ListsCanBeReadInPieces) {
   ASSERT_EQ(jobs->size(), 2);
   EXPECT_EQ(jobs->front().sequence, 2);
   for (int s = 1; s <= 3; ++s) {
-    ASSERT_TRUE(store().SkipCameraJob("castle", s, 1, "gone", kNow).ok());
-    ASSERT_TRUE(store().AddCommit("castle", {s, s, "", 0, 0}, kNow).ok());
+    ASSERT_TRUE(Skip("castle", s, 1, "gone").ok());
+    ASSERT_TRUE(AddCommit("castle", {s, s, "", 0, 0}).ok());
   }
   EXPECT_THAT(*store().ListCommits("castle", 2), testing::ElementsAre(Commit{3, 3, "", 0, 0}));
   ASSERT_EQ(store().ListCommits("castle")->size(), 3U);
@@ -724,7 +767,7 @@ TEST_P(JobStoreConformance, TextIsKeptAsItIs) {
   EXPECT_EQ(stored->id, odd);
   EXPECT_EQ(stored->options_json, "{ \"b\" : 1,\n \"a\":2}");
   AssignJobs(odd, 1);
-  ASSERT_TRUE(store().SkipCameraJob(odd, 1, 1, std::string("a\0b\xe2\x82", 5), kNow).ok());
+  ASSERT_TRUE(Skip(odd, 1, 1, std::string("a\0b\xe2\x82", 5)).ok());
   EXPECT_EQ(store().GetCameraJob(odd, 1)->skip_reason, "a?b??");
 }
 
@@ -797,12 +840,12 @@ TEST_P(JobStoreConformance, OnlyBlobsThatNobodyElseHasVanish) {
   EXPECT_TRUE(*store().AddBlobRef("castle", Digest('q')));
   EXPECT_TRUE(*store().AddBlobRef("abbey", Digest('q')));
   EXPECT_TRUE(absl::IsNotFound(store().AddBlobRef("ruin", Digest('q')).status()));
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 1, 1, Digest('a'), {}, "{}", kNow).ok());
-  ASSERT_TRUE(store().CompleteCameraJob("castle", 2, 1, Digest('b'), {}, "{}", kNow).ok());
-  ASSERT_TRUE(store().CompleteCameraJob("abbey", 1, 1, Digest('b'), {}, "{}", kNow).ok());
-  ASSERT_TRUE(store().AddCommit("castle", {1, 1, Digest('c'), 9, 4}, kNow).ok());
-  ASSERT_TRUE(store().AddCommit("castle", {2, 2, Digest('d'), 9, 4}, kNow).ok());
-  ASSERT_TRUE(store().AddCommit("abbey", {1, 1, Digest('d'), 9, 4}, kNow).ok());
+  ASSERT_TRUE(Complete("castle", 1, 1, Digest('a')).ok());
+  ASSERT_TRUE(Complete("castle", 2, 1, Digest('b')).ok());
+  ASSERT_TRUE(Complete("abbey", 1, 1, Digest('b')).ok());
+  ASSERT_TRUE(AddCommit("castle", {1, 1, Digest('c'), 9, 4}).ok());
+  ASSERT_TRUE(AddCommit("castle", {2, 2, Digest('d'), 9, 4}).ok());
+  ASSERT_TRUE(AddCommit("abbey", {1, 1, Digest('d'), 9, 4}).ok());
   ASSERT_TRUE(store().BeginDeletion("castle").ok());
   EXPECT_TRUE(store().BeginDeletion("castle").ok());
   EXPECT_EQ(store().ListReconstructions()->size(), 1);
@@ -827,18 +870,17 @@ TEST_P(JobStoreConformance, DamagedBlobsAreReportedOnce) {
 }
 
 TEST_P(JobStoreConformance, AMeshEndsAReconstruction) {
-  ASSERT_TRUE(store().SetReconstructionState("castle", ReconstructionState::kJoining, kNow).ok());
+  ASSERT_TRUE(SetState("castle", ReconstructionState::kJoining).ok());
   EXPECT_EQ(store().GetReconstruction("castle")->finished_at, absl::InfinitePast());
-  ASSERT_TRUE(store().FinishReconstruction("castle", {Digest('m'), 5, 6, 7}, kNow + kLease).ok());
-  EXPECT_TRUE(store().FinishReconstruction("castle", {Digest('m'), 5, 6, 7}, kNow + kLease).ok());
+  ASSERT_TRUE(store().FinishReconstruction("castle", {Digest('m'), 5, 6, 7}, kNow + kLease, Conduct("castle")).ok());
+  EXPECT_TRUE(store().FinishReconstruction("castle", {Digest('m'), 5, 6, 7}, kNow + kLease, Conduct("castle")).ok());
   const Reconstruction done = *store().GetReconstruction("castle");
   EXPECT_EQ(done.state, ReconstructionState::kDone);
   EXPECT_EQ(done.finished_at, kNow + kLease);
   EXPECT_EQ(done.created_at, kNow);
   EXPECT_EQ(done.mesh.digest, Digest('m'));
   EXPECT_EQ(done.mesh.faces, 7);
-  EXPECT_TRUE(
-      absl::IsFailedPrecondition(store().SetReconstructionState("castle", ReconstructionState::kCancelled, kNow)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(store().RequestState("castle", ReconstructionState::kCancelled, kNow)));
 }
 
 }  // namespace meshwright

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
-#include <condition_variable>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -13,6 +11,7 @@
 #include <absl/time/clock.h>
 
 #include "common/base/check.h"
+#include "common/base/mutex.h"
 #include "common/base/status_macros.h"
 #include "coordinator/store/postgres_connection.h"
 #include "coordinator/store/sql_job_store.h"
@@ -150,9 +149,11 @@ class PostgresDatabase : public SqlDatabase {
 
   // Waits until fewer than the allowed number of calls are under way; `connection` is an idle one if there is any.
   bool TakeTurn(absl::Time deadline, std::unique_ptr<PostgresConnection>* connection) {
-    std::unique_lock<std::mutex> lock(mutex_);
-    if (!freed_.wait_until(lock, absl::ToChronoTime(deadline), [&] { return running_ < options_.connections; })) {
-      return false;
+    MutexLock lock(mutex_);
+    while (running_ >= options_.connections) {
+      const absl::Duration left = deadline - absl::Now();
+      if (left <= absl::ZeroDuration()) return false;
+      freed_.WaitFor(lock, absl::ToChronoNanoseconds(left));
     }
     ++running_;
     if (!idle_.empty()) {
@@ -164,11 +165,11 @@ class PostgresDatabase : public SqlDatabase {
 
   void EndTurn(std::unique_ptr<PostgresConnection> connection) {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       --running_;
       if (connection != nullptr && connection->IsReusable()) idle_.push_back(std::move(connection));
     }
-    freed_.notify_one();
+    freed_.NotifyOne();
   }
 
   const std::string url_;
@@ -177,10 +178,10 @@ class PostgresDatabase : public SqlDatabase {
   std::map<std::string, PostgresStatement> statements_;
 
   std::atomic<bool> connected_{false};  // some time, with these credentials
-  std::mutex mutex_;
-  std::condition_variable freed_;
-  std::vector<std::unique_ptr<PostgresConnection>> idle_;
-  int running_ = 0;
+  Mutex mutex_;
+  ConditionVariable freed_;
+  std::vector<std::unique_ptr<PostgresConnection>> idle_ ABSL_GUARDED_BY(mutex_);
+  int running_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace

@@ -112,10 +112,11 @@ TEST_F(PostgresJobStoreTest, TheClockIsTheDatabases) {
 TEST_F(PostgresJobStoreTest, SessionsThatTheServerEndsAreMadeAnew) {
   const auto store = OpenOrNull(schema_->url());
   ASSERT_TRUE(store->CreateReconstruction(kReconstruction, kNow).ok());
+  const int64_t epoch = *store->AcquireConductorLease("castle", "north", kNow + absl::Seconds(1), kNow);
   for (int s = 1; s <= 20; ++s) {
     RunSql(server_url_,
            "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name = 'meshwright'");
-    const absl::Status status = store->AssignCameraJob("castle", {s, s, 0}, kNow);
+    const absl::Status status = store->Advance("castle", {}, {{s, s, 0}}, {}, kNow, epoch);
     EXPECT_TRUE(status.ok()) << status;
   }
   EXPECT_EQ(store->ListCameraJobs("castle")->size(), 20);
@@ -130,7 +131,7 @@ TEST_F(PostgresJobStoreTest, ATakeoverWaitsForTheWriteThatWasFirst) {
   std::atomic<bool> taken{false};
   std::thread south;
   {
-    // What AddCommit holds while its transaction is open.
+    // What Advance() holds while its transaction is open.
     std::thread north([&] {
       RunSql(schema_->url(),
              "BEGIN; SELECT 1 FROM conductor_leases WHERE epoch = 1 FOR SHARE; SELECT pg_sleep(0.5); COMMIT");
@@ -160,6 +161,7 @@ TEST(PostgresRestartTest, CallsOutliveARestart) {
   ASSERT_NE(store, nullptr);
   const absl::Time now = absl::FromUnixSeconds(1'000'000'000);
   ASSERT_TRUE(store->CreateReconstruction({"castle", "{}", std::string(64, '0')}, now).ok());
+  const int64_t epoch = *store->AcquireConductorLease("castle", "north", now + absl::Seconds(1), now);
   constexpr int kThreads = 3;
   std::atomic<bool> stop{false};
   std::atomic<int> next{1};
@@ -169,10 +171,16 @@ TEST(PostgresRestartTest, CallsOutliveARestart) {
     threads.emplace_back([&] {
       while (!stop) {
         const int s = next++;
-        const absl::Status assigned = store->AssignCameraJob("castle", {s, s, 0}, now);
+        const absl::Status assigned = store->Advance("castle", {}, {{s, s, 0}}, {}, now, epoch);
         EXPECT_TRUE(assigned.ok()) << assigned;
-        const absl::Status completed = store->CompleteCameraJob("castle", s, 1, std::string(64, 'a'), {}, "{}", now);
-        EXPECT_TRUE(completed.ok()) << completed;
+        const auto completed = store->ApplyChanges({{.kind = JobChange::Kind::kComplete,
+                                                     .id = "castle",
+                                                     .sequence = s,
+                                                     .epoch = 1,
+                                                     .filtered_digest = std::string(64, 'a'),
+                                                     .report_json = "{}"}},
+                                                   {}, now);
+        EXPECT_TRUE(completed.ok()) << completed.status();
       }
     });
   }

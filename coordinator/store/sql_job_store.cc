@@ -79,7 +79,7 @@ SqlCall AssignCall(const std::string& id, const CameraAssignment& assignment, ab
            {"conductor_epoch", conductor_epoch}}};
 }
 
-SqlCall ProgressCall(const std::string& id, const StoredProgress& progress, int64_t conductor_epoch) {
+SqlCall ProgressCall(const std::string& id, const Progress& progress, int64_t conductor_epoch) {
   return {"set_progress",
           {{"id", id},
            {"cameras_total", progress.cameras_total},
@@ -114,29 +114,6 @@ absl::StatusOr<ReconstructionState> ReadReconstructionState(const std::string& t
     if (text == name) return state;
   }
   return absl::DataLossError(absl::StrCat("a reconstruction has the unknown state ", text));
-}
-
-SqlCall CompleteCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& filtered_digest,
-                     const std::vector<CameraIndex>& weak_targets, const std::string& report_json, absl::Time now) {
-  return {"complete_camera_job",
-          {{"id", id},
-           {"sequence", sequence},
-           {"epoch", epoch},
-           {"filtered_digest", filtered_digest},
-           {"weak_targets", JoinCameraIndices(weak_targets)},
-           {"report_json", report_json},
-           {"now", absl::ToUnixMicros(now)}}};
-}
-
-SqlCall SkipCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason,
-                 bool out_of_memory, absl::Time now) {
-  return {"set_camera_job_aside",
-          {{"id", id},
-           {"sequence", sequence},
-           {"epoch", epoch},
-           {"reason", PrintableText(reason)},
-           {"ending", std::string(out_of_memory ? "out_of_memory" : "failed")},
-           {"now", absl::ToUnixMicros(now)}}};
 }
 
 absl::StatusOr<CameraJob> ReadCameraJob(const SqlRow& row) {
@@ -221,8 +198,17 @@ absl::Status SqlJobStore::SetReconstructionScene(const std::string& id, const st
       absl::StrCat("reconstruction ", id, " is ", StateText(stored.state), "; its scene cannot change any more"));
 }
 
-absl::Status SqlJobStore::SetReconstructionState(const std::string& id, ReconstructionState state, absl::Time now,
-                                                 const std::string& reason, int64_t conductor_epoch) {
+absl::Status SqlJobStore::RequestState(const std::string& id, ReconstructionState state, absl::Time now) {
+  MW_ASSIGN_OR_RETURN(const SqlResult result,
+                      database_->Run("request_reconstruction_state", {{"id", id},
+                                                                      {"state", StateText(state)},
+                                                                      {"is_final", IsFinal(state) ? 1 : 0},
+                                                                      {"now", absl::ToUnixMicros(now)}}));
+  return result.changed == 1 ? absl::OkStatus() : ExplainState(id, state);
+}
+
+absl::Status SqlJobStore::SetReconstructionState(const std::string& id, ReconstructionState state,
+                                                 const std::string& reason, absl::Time now, int64_t conductor_epoch) {
   MW_ASSIGN_OR_RETURN(const SqlResult result,
                       database_->Run("set_reconstruction_state", {{"id", id},
                                                                   {"state", StateText(state)},
@@ -231,12 +217,12 @@ absl::Status SqlJobStore::SetReconstructionState(const std::string& id, Reconstr
                                                                   {"now", absl::ToUnixMicros(now)},
                                                                   {"conductor_epoch", conductor_epoch}}));
   if (result.changed == 1) return absl::OkStatus();
-  return ExplainState(id, state, conductor_epoch);
+  MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
+  return ExplainState(id, state);
 }
 
-absl::Status SqlJobStore::ExplainState(const std::string& id, ReconstructionState state, int64_t conductor_epoch) {
+absl::Status SqlJobStore::ExplainState(const std::string& id, ReconstructionState state) {
   MW_ASSIGN_OR_RETURN(const Reconstruction stored, GetReconstruction(id));
-  MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
   if (stored.state == state) return absl::OkStatus();
   return absl::FailedPreconditionError(
       absl::StrCat("reconstruction ", id, " is ", StateText(stored.state), ", which is final"));
@@ -253,7 +239,8 @@ absl::Status SqlJobStore::FinishReconstruction(const std::string& id, const Stor
                                                                {"now", absl::ToUnixMicros(now)},
                                                                {"conductor_epoch", conductor_epoch}}));
   if (result.changed == 1) return absl::OkStatus();
-  return ExplainState(id, ReconstructionState::kDone, conductor_epoch);
+  MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
+  return ExplainState(id, ReconstructionState::kDone);
 }
 
 absl::Status SqlJobStore::BeginDeletion(const std::string& id) {
@@ -283,37 +270,6 @@ absl::Status SqlJobStore::AssignCameraJob(const std::string& id, const CameraAss
                                                     assignment.camera, " at snapshot ", assignment.snapshot));
 }
 
-absl::StatusOr<int64_t> SqlJobStore::ReassignCameraJob(const std::string& id, SequenceNumber sequence, absl::Time now) {
-  MW_ASSIGN_OR_RETURN(
-      const SqlResult result,
-      database_->Run("reassign_camera_job", {{"id", id}, {"sequence", sequence}, {"now", absl::ToUnixMicros(now)}}));
-  if (!result.rows.empty()) return result.rows.front().Integer(0);
-  MW_RETURN_IF_ERROR(GetCameraJob(id, sequence).status());
-  return absl::FailedPreconditionError(absl::StrCat(CameraJobName(id, sequence), " is finished already"));
-}
-
-absl::Status SqlJobStore::CompleteCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                            const std::string& filtered_digest,
-                                            const std::vector<CameraIndex>& weak_targets,
-                                            const std::string& report_json, absl::Time now) {
-  const SqlCall call = CompleteCall(id, sequence, epoch, filtered_digest, weak_targets, report_json, now);
-  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(call.statement, call.parameters));
-  if (result.changed == 1) return absl::OkStatus();
-  MW_ASSIGN_OR_RETURN(const CameraJob job, GetFencedCameraJob(id, sequence, epoch));
-  if (job.state == CameraJobState::kDone && job.filtered_digest == filtered_digest) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat(CameraJobName(id, sequence), " has another result already"));
-}
-
-absl::Status SqlJobStore::SkipCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                        const std::string& reason, absl::Time now) {
-  const SqlCall call = SkipCall(id, sequence, epoch, reason, /*out_of_memory=*/false, now);
-  MW_ASSIGN_OR_RETURN(const SqlResult result, database_->Run(call.statement, call.parameters));
-  if (result.changed == 1) return absl::OkStatus();
-  MW_ASSIGN_OR_RETURN(const CameraJob job, GetFencedCameraJob(id, sequence, epoch));
-  if (job.state == CameraJobState::kSkipped) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat(CameraJobName(id, sequence), " is done already"));
-}
-
 absl::Status SqlJobStore::ReopenCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
                                           const std::string& expected_digest, const std::string& reason,
                                           absl::Time retry_at, int64_t conductor_epoch) {
@@ -327,8 +283,8 @@ absl::Status SqlJobStore::ReopenCameraJob(const std::string& id, SequenceNumber 
                                                            {"conductor_epoch", conductor_epoch}}));
   if (result.changed == 1) return absl::OkStatus();
   MW_RETURN_IF_ERROR(CheckConductor(id, conductor_epoch));
-  MW_RETURN_IF_ERROR(GetFencedCameraJob(id, sequence, epoch).status());
-  return absl::AbortedError(absl::StrCat(CameraJobName(id, sequence), " is not done"));
+  MW_RETURN_IF_ERROR(GetCameraJob(id, sequence).status());
+  return absl::AbortedError(absl::StrCat(CameraJobName(id, sequence), " is not done in epoch ", epoch));
 }
 
 absl::StatusOr<CameraJob> SqlJobStore::GetCameraJob(const std::string& id, SequenceNumber sequence) {
@@ -377,7 +333,7 @@ absl::Status SqlJobStore::AddCommit(const std::string& id, const Commit& commit,
 }
 
 absl::Status SqlJobStore::Advance(const std::string& id, const std::vector<Commit>& commits,
-                                  const std::vector<CameraAssignment>& assignments, const StoredProgress& progress,
+                                  const std::vector<CameraAssignment>& assignments, const Progress& progress,
                                   absl::Time now, int64_t conductor_epoch) {
   std::vector<SqlCall> calls;
   calls.reserve(commits.size() + assignments.size() + 1);
@@ -406,16 +362,6 @@ absl::StatusOr<std::vector<Commit>> SqlJobStore::ListCommits(const std::string& 
   commits.reserve(result.rows.size());
   for (const SqlRow& row : result.rows) commits.push_back(ReadCommit(row));
   return commits;
-}
-
-absl::StatusOr<CameraJob> SqlJobStore::GetFencedCameraJob(const std::string& id, SequenceNumber sequence,
-                                                          int64_t epoch) {
-  MW_ASSIGN_OR_RETURN(CameraJob job, GetCameraJob(id, sequence));
-  if (job.epoch != epoch) {
-    return absl::AbortedError(absl::StrCat(CameraJobName(id, sequence), " was handed out again (epoch ", job.epoch,
-                                           "); epoch ", epoch, " may not write any more"));
-  }
-  return job;
 }
 
 }  // namespace meshwright

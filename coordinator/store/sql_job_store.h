@@ -22,22 +22,18 @@ class SqlJobStore : public JobStore {
   absl::StatusOr<std::vector<Reconstruction>> ListReconstructionsOf(const std::string& owner, const std::string& after,
                                                                     int64_t limit) override;
   absl::StatusOr<Usage> UsageOf(const std::string& owner) override;
+  absl::Status RequestState(const std::string& id, ReconstructionState state, absl::Time now) override;
   absl::Status SetReconstructionScene(const std::string& id, const std::string& scene_digest,
                                       const std::string& scene_blob, int64_t conductor_epoch) override;
-  absl::Status SetReconstructionState(const std::string& id, ReconstructionState state, absl::Time now,
-                                      const std::string& reason, int64_t conductor_epoch) override;
+  absl::Status SetReconstructionState(const std::string& id, ReconstructionState state, const std::string& reason,
+                                      absl::Time now, int64_t conductor_epoch) override;
   absl::Status FinishReconstruction(const std::string& id, const StoredMesh& mesh, absl::Time now,
                                     int64_t conductor_epoch) override;
+  absl::Status Advance(const std::string& id, const std::vector<Commit>& commits,
+                       const std::vector<CameraAssignment>& assignments, const Progress& progress, absl::Time now,
+                       int64_t conductor_epoch) override;
   absl::Status BeginDeletion(const std::string& id) override;
   absl::Status DeleteReconstruction(const std::string& id) override;
-  absl::Status AssignCameraJob(const std::string& id, const CameraAssignment& assignment, absl::Time now,
-                               int64_t conductor_epoch) override;
-  absl::StatusOr<int64_t> ReassignCameraJob(const std::string& id, SequenceNumber sequence, absl::Time now) override;
-  absl::Status CompleteCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
-                                 const std::string& filtered_digest, const std::vector<CameraIndex>& weak_targets,
-                                 const std::string& report_json, absl::Time now) override;
-  absl::Status SkipCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason,
-                             absl::Time now) override;
   absl::Status ReopenCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch,
                                const std::string& expected_digest, const std::string& reason, absl::Time retry_at,
                                int64_t conductor_epoch) override;
@@ -49,10 +45,6 @@ class SqlJobStore : public JobStore {
                                                             const std::vector<WorkerRecord>& heartbeats,
                                                             absl::Time now) override;
   absl::StatusOr<std::vector<Attempt>> ListAttempts(const std::string& id, int64_t limit) override;
-  absl::Status AddCommit(const std::string& id, const Commit& commit, absl::Time now, int64_t conductor_epoch) override;
-  absl::Status Advance(const std::string& id, const std::vector<Commit>& commits,
-                       const std::vector<CameraAssignment>& assignments, const StoredProgress& progress, absl::Time now,
-                       int64_t conductor_epoch) override;
   absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after, int64_t limit) override;
   absl::StatusOr<int64_t> AcquireConductorLease(const std::string& id, const std::string& owner, absl::Time expires_at,
                                                 absl::Time now) override;
@@ -78,12 +70,14 @@ class SqlJobStore : public JobStore {
   absl::Status ForgetDamagedBlob(const std::string& id, const std::string& digest) override;
 
  private:
+  // One part of Advance() alone. Repeating it is OK.
+  absl::Status AddCommit(const std::string& id, const Commit& commit, absl::Time now, int64_t conductor_epoch);
+  absl::Status AssignCameraJob(const std::string& id, const CameraAssignment& assignment, absl::Time now,
+                               int64_t conductor_epoch);
   // Why a state could not be set: OK when it is that already.
-  absl::Status ExplainState(const std::string& id, ReconstructionState state, int64_t conductor_epoch);
-  // Aborted unless `epoch` is the reconstruction's current one, or 0.
+  absl::Status ExplainState(const std::string& id, ReconstructionState state);
+  // Aborted unless `epoch` is the reconstruction's current one.
   absl::Status CheckConductor(const std::string& id, int64_t epoch);
-  // Aborted unless the job's epoch is this one.
-  absl::StatusOr<CameraJob> GetFencedCameraJob(const std::string& id, SequenceNumber sequence, int64_t epoch);
 
   const std::unique_ptr<SqlDatabase> database_;
 };
@@ -91,10 +85,6 @@ class SqlJobStore : public JobStore {
 absl::StatusOr<CameraJob> ReadCameraJob(const SqlRow& row);
 std::string CameraJobName(const std::string& id, SequenceNumber sequence);
 absl::StatusOr<ReconstructionState> ReadReconstructionState(const std::string& text);
-SqlCall CompleteCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& filtered_digest,
-                     const std::vector<CameraIndex>& weak_targets, const std::string& report_json, absl::Time now);
-SqlCall SkipCall(const std::string& id, SequenceNumber sequence, int64_t epoch, const std::string& reason,
-                 bool out_of_memory, absl::Time now);
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

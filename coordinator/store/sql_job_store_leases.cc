@@ -8,6 +8,27 @@ namespace meshwright {
 
 namespace {
 
+SqlCall CompleteCall(const JobChange& change, absl::Time now) {
+  return {"complete_camera_job",
+          {{"id", change.id},
+           {"sequence", change.sequence},
+           {"epoch", change.epoch},
+           {"filtered_digest", change.filtered_digest},
+           {"weak_targets", JoinCameraIndices(change.weak_targets)},
+           {"report_json", change.report_json},
+           {"now", absl::ToUnixMicros(now)}}};
+}
+
+SqlCall SkipCall(const JobChange& change, absl::Time now) {
+  return {"set_camera_job_aside",
+          {{"id", change.id},
+           {"sequence", change.sequence},
+           {"epoch", change.epoch},
+           {"reason", PrintableText(change.reason)},
+           {"ending", std::string(change.out_of_memory ? "out_of_memory" : "failed")},
+           {"now", absl::ToUnixMicros(now)}}};
+}
+
 // A statement for each change.
 SqlCall ChangeCall(const JobChange& change, absl::Time now) {
   SqlParameters parameters = {{"id", change.id}, {"sequence", change.sequence}, {"epoch", change.epoch}};
@@ -24,10 +45,9 @@ SqlCall ChangeCall(const JobChange& change, absl::Time now) {
     case JobChange::Kind::kRenew:
       return with("renew_lease", {{"worker", change.worker}, {"expires_at", absl::ToUnixMicros(change.expires_at)}});
     case JobChange::Kind::kComplete:
-      return CompleteCall(change.id, change.sequence, change.epoch, change.filtered_digest, change.weak_targets,
-                          change.report_json, now);
+      return CompleteCall(change, now);
     case JobChange::Kind::kSkipped:
-      return SkipCall(change.id, change.sequence, change.epoch, change.reason, change.out_of_memory, now);
+      return SkipCall(change, now);
     case JobChange::Kind::kRelease:
       return with("release_lease", {{"worker", change.worker},
                                     {"retry_at", absl::ToUnixMicros(change.retry_at)},
@@ -60,6 +80,12 @@ absl::StatusOr<JobChangeResult> ReadChange(const JobChange& change, const SqlRes
                                         change.epoch, ", or not held by worker ", change.worker, ", any more"));
   }
   return read;
+}
+
+// Whether the database has failed, and not a value that it does not take.
+bool IsOutage(const absl::Status& status) {
+  return absl::IsUnavailable(status) || absl::IsResourceExhausted(status) || absl::IsDataLoss(status) ||
+         absl::IsPermissionDenied(status);
 }
 
 SqlCall HeartbeatCall(const WorkerRecord& worker) {
@@ -116,12 +142,12 @@ absl::StatusOr<std::vector<JobChangeResult>> SqlJobStore::ApplyChanges(const std
     }
     return results;
   }
-  if (absl::IsUnavailable(together.status()) || absl::IsResourceExhausted(together.status())) return together.status();
+  if (IsOutage(together.status())) return together.status();
   // One of them cannot be stored: the others shall not suffer for it.
   for (size_t i = 0; i < calls.size(); ++i) {
     const absl::StatusOr<SqlResult> alone = database_->Run(calls[i].statement, calls[i].parameters);
     if (i >= changes.size()) continue;
-    if (absl::IsUnavailable(alone.status())) return alone.status();
+    if (IsOutage(alone.status())) return alone.status();
     JobChangeResult& result = results.emplace_back();
     if (!alone.ok()) {
       result.status = alone.status();
@@ -151,7 +177,6 @@ absl::StatusOr<std::vector<Attempt>> SqlJobStore::ListAttempts(const std::string
 }
 
 absl::Status SqlJobStore::CheckConductor(const std::string& id, int64_t epoch) {
-  if (epoch == 0) return absl::OkStatus();
   const absl::StatusOr<ConductorLease> lease = GetConductorLease(id);
   if (lease.ok() && lease->epoch == epoch) return absl::OkStatus();
   if (!lease.ok() && !absl::IsNotFound(lease.status())) return lease.status();

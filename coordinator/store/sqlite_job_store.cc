@@ -1,11 +1,11 @@
 #include "coordinator/store/sqlite_job_store.h"
 
-#include <mutex>
 #include <utility>
 #include <vector>
 
 #include <absl/strings/str_cat.h>
 
+#include "common/base/mutex.h"
 #include "common/base/status_macros.h"
 #include "coordinator/store/sql_job_store.h"
 #include "coordinator/store/sqlite_connection.h"
@@ -18,7 +18,7 @@ class SqliteDatabase : public SqlDatabase {
   SqliteDatabase(SqliteConnection connection, const Clock* clock) : clock_(clock), connection_(std::move(connection)) {}
 
   absl::StatusOr<SqlResult> Run(const std::string& name, const SqlParameters& parameters) override {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     return RunLocked(name, parameters);
   }
 
@@ -38,9 +38,9 @@ class SqliteDatabase : public SqlDatabase {
  private:
   // Cancelled: one did not change exactly one row, and nothing was changed.
   absl::StatusOr<std::vector<SqlResult>> RunTransaction(const std::vector<SqlCall>& calls, bool each_changes_one_row) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     std::vector<SqlResult> results;
-    MW_RETURN_IF_ERROR(connection_.Transaction([&]() -> absl::Status {
+    MW_RETURN_IF_ERROR(connection_.Transaction([&]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) -> absl::Status {
       for (const SqlCall& call : calls) {
         MW_ASSIGN_OR_RETURN(SqlResult result, RunLocked(call.statement, call.parameters));
         if (each_changes_one_row && result.changed != 1) return absl::CancelledError("rolled back");
@@ -51,7 +51,8 @@ class SqliteDatabase : public SqlDatabase {
     return results;
   }
 
-  absl::StatusOr<SqlResult> RunLocked(const std::string& name, const SqlParameters& parameters) {
+  absl::StatusOr<SqlResult> RunLocked(const std::string& name, const SqlParameters& parameters)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     MW_ASSIGN_OR_RETURN(SqliteStatement statement, connection_.Prepare(name));
     for (const auto& [parameter, value] : parameters) {
       const std::string bound_name = absl::StrCat(":", parameter);
@@ -77,8 +78,8 @@ class SqliteDatabase : public SqlDatabase {
   }
 
   const Clock* const clock_;
-  std::mutex mutex_;
-  SqliteConnection connection_;
+  Mutex mutex_;
+  SqliteConnection connection_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace

@@ -74,7 +74,7 @@ TEST(SqliteJobStoreTest, AStoreOfTheFirstVersionIsBroughtUpToDateWithWhatIsInIt)
   EXPECT_EQ((*store)->GetCameraJob("castle", 1)->state, CameraJobState::kDone);
   EXPECT_THAT(*(*store)->ListCommits("castle"), testing::ElementsAre(Commit{1, 7, std::string(64, 'a'), 9, 4}));
   // Foreign keys still point at the table that was made anew.
-  EXPECT_FALSE((*store)->AssignCameraJob("ruin", {1, 1, 0}, absl::UnixEpoch()).ok());
+  EXPECT_FALSE((*store)->PutSceneFile("ruin", {"a", 1, std::string(64, 'a')}).ok());
   EXPECT_TRUE((*store)->DeleteReconstruction("castle").ok());
   EXPECT_TRUE((*store)->ListCommits("castle")->empty());
 }

@@ -21,6 +21,7 @@ constexpr char kEnded[] = "meshwright_leases_ended_total";
 constexpr char kEndedHelp[] = "Leases of camera jobs by how they ended; lost: the worker was silent for too long.";
 constexpr CountedStatement kCountedStatements[] = {
     {"create_reconstruction", nullptr, nullptr, nullptr, "reconstruction created", false},
+    {"request_reconstruction_state", nullptr, nullptr, nullptr, "reconstruction state", false},
     {"set_reconstruction_state", nullptr, nullptr, nullptr, "reconstruction state", false},
     {"finish_reconstruction", nullptr, nullptr, nullptr, "reconstruction done", false},
     {"reopen_camera_job", nullptr, nullptr, nullptr, "result taken back", true},
@@ -33,7 +34,6 @@ constexpr CountedStatement kCountedStatements[] = {
     {"fail_lease", kEnded, kEndedHelp, "failed", "job failed", true},
     {"release_lease", kEnded, kEndedHelp, "released", "job released", false},
     {"expire_lease", kEnded, kEndedHelp, "lost", "lease lost", true},
-    {"reassign_camera_job", nullptr, nullptr, nullptr, "job handed out again", true},
     {"set_camera_job_aside", "meshwright_cameras_skipped_total", "Cameras given up after repeated failures.", nullptr,
      "camera skipped", true},
     {"add_commit", "meshwright_commits_total", "Cameras committed, in the order of their reconstructions.", nullptr,

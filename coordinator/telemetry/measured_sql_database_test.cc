@@ -42,6 +42,9 @@ class MeasuredStoreTest : public testing::Test {
                     ->CreateReconstruction({.id = "r", .options_json = "{}", .scene_digest = std::string(64, 'a')},
                                            clock_.Now())
                     .ok());
+    const auto epoch = store_->AcquireConductorLease("r", "c", clock_.Now() + absl::Seconds(5), clock_.Now());
+    ASSERT_TRUE(epoch.ok()) << epoch.status();
+    epoch_ = *epoch;
   }
   void TearDown() override {
     workers_.reset();
@@ -49,7 +52,19 @@ class MeasuredStoreTest : public testing::Test {
     std::filesystem::remove_all(folder_);
   }
   void Assign(SequenceNumber sequence) {
-    ASSERT_TRUE(store_->AssignCameraJob("r", {sequence, sequence, sequence - 1}, clock_.Now()).ok());
+    ASSERT_TRUE(store_->Advance("r", {}, {{sequence, sequence, sequence - 1}}, {}, clock_.Now(), epoch_).ok());
+  }
+  absl::Status AddCommit(const Commit& commit) { return store_->Advance("r", {commit}, {}, {}, clock_.Now(), epoch_); }
+  void End(JobChange::Kind kind, SequenceNumber sequence, int64_t epoch) {
+    const JobChange change = {.kind = kind,
+                              .id = "r",
+                              .sequence = sequence,
+                              .epoch = epoch,
+                              .filtered_digest = std::string(64, 'b'),
+                              .report_json = "{}",
+                              .reason = "failed too often"};
+    const auto results = store_->ApplyChanges({change}, {}, clock_.Now());
+    ASSERT_TRUE(results.ok() && results->front().status.ok());
   }
   // What a turn of a coordinator changes about job 1; returns its epoch.
   int64_t Change(JobChange::Kind kind, int64_t epoch) {
@@ -72,6 +87,7 @@ class MeasuredStoreTest : public testing::Test {
   std::vector<std::string> lines_;
   SqlDatabase* database_ = nullptr;
   std::unique_ptr<JobStore> store_;
+  int64_t epoch_ = 0;  // of the conductor's lease
   std::unique_ptr<WorkerService> workers_;
 };
 
@@ -86,7 +102,7 @@ TEST_F(MeasuredStoreTest, LeasesAreCountedByHowTheyEnd) {
   epoch = Change(JobChange::Kind::kClaim, epoch);
   Change(JobChange::Kind::kLose, epoch);
   epoch = Change(JobChange::Kind::kClaim, epoch);
-  ASSERT_TRUE(store_->CompleteCameraJob("r", 1, epoch, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
+  End(JobChange::Kind::kComplete, 1, epoch);
   ExpectLine("meshwright_leases_granted_total 4");
   ExpectLine("meshwright_leases_renewed_total 1");
   for (const char* const outcome : {"finished", "failed", "released", "lost"}) {
@@ -98,10 +114,10 @@ TEST_F(MeasuredStoreTest, LeasesAreCountedByHowTheyEnd) {
 TEST_F(MeasuredStoreTest, CommitsBringAcceptedRaysAlsoInTransactions) {
   for (const SequenceNumber sequence : {1, 2}) {
     Assign(sequence);
-    ASSERT_TRUE(store_->CompleteCameraJob("r", sequence, 1, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
+    End(JobChange::Kind::kComplete, sequence, 1);
   }
   Assign(3);
-  ASSERT_TRUE(store_->SkipCameraJob("r", 3, 1, "failed too often", clock_.Now()).ok());
+  End(JobChange::Kind::kSkipped, 3, 1);
   const std::string accepted(64, 'c');
   const auto commit = [&](SequenceNumber sequence, int64_t patches) {
     return Commit{.sequence = sequence,
@@ -110,12 +126,12 @@ TEST_F(MeasuredStoreTest, CommitsBringAcceptedRaysAlsoInTransactions) {
                   .filtered_patches = patches,
                   .accepted_patches = patches};
   };
-  ASSERT_TRUE(store_->AddCommit("r", commit(1, 100), clock_.Now()).ok());
-  ASSERT_TRUE(store_->AddCommit("r", commit(1, 100), clock_.Now()).ok());  // a repetition
-  ASSERT_TRUE(
-      store_
-          ->Advance("r", {commit(2, 20), commit(3, 0)}, {{.sequence = 4, .camera = 4, .snapshot = 3}}, {}, clock_.Now())
-          .ok());
+  ASSERT_TRUE(AddCommit(commit(1, 100)).ok());
+  ASSERT_TRUE(AddCommit(commit(1, 100)).ok());  // a repetition
+  ASSERT_TRUE(store_
+                  ->Advance("r", {commit(2, 20), commit(3, 0)}, {{.sequence = 4, .camera = 4, .snapshot = 3}}, {},
+                            clock_.Now(), epoch_)
+                  .ok());
   ExpectLine("meshwright_commits_total 3");
   ExpectLine("meshwright_rays_accepted_total 120");
   ExpectLine("meshwright_cameras_skipped_total 1");
@@ -128,6 +144,7 @@ TEST_F(MeasuredStoreTest, WhatHappensIsLoggedOnceAndWithNames) {
   for (int repetition = 0; repetition < 2; ++repetition) Change(JobChange::Kind::kFail, epoch);
   EXPECT_THAT(lines_, testing::ElementsAre(
                           testing::EndsWith("info    reconstruction created  reconstruction=r  state=running"),
+                          testing::EndsWith("info    conducting  reconstruction=r  coordinator=c"),
                           testing::EndsWith("info    job leased  reconstruction=r  sequence=1  attempt=1  worker=w"),
                           testing::EndsWith("warning job failed  reconstruction=r  sequence=1  attempt=2  worker=w  "
                                             "error=x")));
@@ -141,12 +158,12 @@ TEST_F(MeasuredStoreTest, GaugesFollowTheStore) {
   clock_.Advance(absl::Seconds(90));
   ExpectLine("meshwright_jobs_waiting 2");
   ExpectLine("meshwright_longest_without_commit_seconds 90");
-  ASSERT_TRUE(store_->CompleteCameraJob("r", 1, 1, std::string(64, 'b'), {}, "{}", clock_.Now()).ok());
+  End(JobChange::Kind::kComplete, 1, 1);
   ExpectLine("meshwright_jobs_waiting 1");
-  ASSERT_TRUE(store_->AddCommit("r", {.sequence = 1, .camera = 1}, clock_.Now()).ok());
+  ASSERT_TRUE(AddCommit({.sequence = 1, .camera = 1}).ok());
   ExpectLine("meshwright_longest_without_commit_seconds 0");
   // Jobs of what does not run are no queue.
-  ASSERT_TRUE(store_->SetReconstructionState("r", ReconstructionState::kCancelled, clock_.Now()).ok());
+  ASSERT_TRUE(store_->RequestState("r", ReconstructionState::kCancelled, clock_.Now()).ok());
   ExpectLine("meshwright_jobs_waiting 0");
   ExpectLine("meshwright_reconstructions{state=\"cancelled\"} 1");
   ExpectLine("meshwright_reconstructions{state=\"running\"} 0");
@@ -187,11 +204,16 @@ TEST(MeasuredPostgresTest, CountsAndGaugesAreThose) {
                                          now - absl::Hours(2))
                   .ok());
   EXPECT_THAT(metrics.Text(), testing::ContainsRegex("\nmeshwright_longest_without_commit_seconds 72[0-9][0-9]"));
-  for (const SequenceNumber sequence : {1, 2}) {
-    ASSERT_TRUE((*store)->AssignCameraJob("r", {sequence, sequence, 0}, now).ok());
-  }
-  ASSERT_TRUE((*store)->CompleteCameraJob("r", 1, 1, std::string(64, 'b'), {}, "{}", now).ok());
-  ASSERT_TRUE((*store)->AddCommit("r", {.sequence = 1, .camera = 1}, now).ok());
+  const int64_t epoch = *(*store)->AcquireConductorLease("r", "c", now + absl::Seconds(5), now);
+  ASSERT_TRUE((*store)->Advance("r", {}, {{1, 1, 0}, {2, 2, 0}}, {}, now, epoch).ok());
+  const JobChange done = {.kind = JobChange::Kind::kComplete,
+                          .id = "r",
+                          .sequence = 1,
+                          .epoch = 1,
+                          .filtered_digest = std::string(64, 'b'),
+                          .report_json = "{}"};
+  ASSERT_TRUE((*store)->ApplyChanges({done}, {}, now)->front().status.ok());
+  ASSERT_TRUE((*store)->Advance("r", {{.sequence = 1, .camera = 1}}, {}, {}, now, epoch).ok());
   const std::string text = metrics.Text();
   for (const char* const line :
        {"meshwright_jobs_waiting 1", "meshwright_commits_total 1", "meshwright_reconstructions{state=\"running\"} 1",

@@ -11,6 +11,7 @@
 #include <absl/strings/str_format.h>
 #include <absl/time/clock.h>
 
+#include "pipeline/config/parse_config.h"
 #include "pipeline/local/report.h"
 #include "pipeline/local/work_folder.h"
 #include "pipeline/options/options_json.h"
@@ -21,12 +22,15 @@
 #include "common/base/files.h"
 #include "common/base/process_usage.h"
 #include "common/base/status_macros.h"
+#include "common/blob/lost_blob.h"
 #include "common/json/json_text.h"
 #include "common/mesh/formats/mesh_format.h"
 #include "common/mesh/surface_mesh.h"
 #include "common/scene/scene_check.h"
 #include "common/scene/view.h"
 #include "coordinator/conductor/accepted_mesh.h"
+#include "coordinator/conductor/conductor_lease.h"
+#include "coordinator/conductor/outer_loop.h"
 #include "worker/job_input/view_cache.h"
 
 namespace meshwright {
@@ -34,6 +38,12 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+// Names this process as the conductor of its reconstruction.
+constexpr char kConductor[] = "local";
+constexpr absl::Duration kConductorLease = absl::Minutes(1);
+// Surfaces that are found damaged or lost when the mesh is written are made again so often.
+constexpr int kMaxRepairs = 100;
 
 // What decoded photographs may take that no job uses at the moment: twice what the running jobs hold, whatever the
 // number of cameras, and at most a quarter of the memory limit.
@@ -141,11 +151,12 @@ class LocalReconstruction {
     MW_RETURN_IF_ERROR(OpenWorkFolder());
     RemovePartialFiles(settings_.output_path);
     RemovePartialFiles(settings_.report_path);
-    MW_RETURN_IF_ERROR(OpenConductor());
-    MW_RETURN_IF_ERROR(RunJobs());
-    MW_ASSIGN_OR_RETURN(Json report, WriteResults());
+    MW_RETURN_IF_ERROR(OpenLoop());
+    absl::StatusOr<Json> report = RunJobsAndWriteResults();
+    lease_->Release(clock_.Now()).IgnoreError();
+    MW_RETURN_IF_ERROR(report.status());
     if (!settings_.keep_work_folder) {
-      conductor_.reset();
+      loop_.reset();
       MW_RETURN_IF_ERROR(work_->Remove());
     }
     return report;
@@ -171,26 +182,52 @@ class LocalReconstruction {
     return absl::OkStatus();
   }
 
-  absl::Status OpenConductor() {
+  absl::Status OpenLoop() {
     Tell(LocalStage::kPairs, 0, 0);
     for (const SceneView& view : scene_.views) {
       cameras_.push_back(UndistortedCamera(view, options_.max_image_size));
     }
-    absl::StatusOr<std::unique_ptr<Conductor>> opened =
-        Conductor::Open(WorkFolder::kReconstructionId, cameras_, scene_.points, options_.conductor, &work_->store(),
-                        &work_->blobs(), &clock_, &pool_);
-    if (absl::IsFailedPrecondition(opened.status())) return BadInput(opened.status());
-    MW_RETURN_IF_ERROR(opened.status());
-    conductor_ = *std::move(opened);
-    progress_.resumed_from = conductor_->progress().cameras_committed;
+    blobs_.emplace(work_->blobs());
+    MW_ASSIGN_OR_RETURN(lease_, HeldConductorLease::Acquire(work_->store(), WorkFolder::kReconstructionId, kConductor,
+                                                            kConductorLease, clock_.Now()));
+    MW_ASSIGN_OR_RETURN(const ReconstructionConfig config, ParseConfig(ToJson(options_).dump()));
+    const OuterLoopEnvironment environment = {
+        .store = &work_->store(), .blobs = &*blobs_, .clock = &clock_, .pool = &pool_};
+    MW_ASSIGN_OR_RETURN(loop_, OuterLoop::Open(environment, WorkFolder::kReconstructionId, lease_->epoch(), cameras_,
+                                               scene_.points, config));
+    progress_.resumed_from = static_cast<int>(loop_->conductor().progress().cameras_committed);
     return MakeCamerasReport(scene_, work_->store(), WorkFolder::kReconstructionId, &totals_).status();
+  }
+
+  absl::StatusOr<Json> RunJobsAndWriteResults() {
+    for (int repairs = 0;; ++repairs) {
+      MW_RETURN_IF_ERROR(SetState(ReconstructionState::kRunning));
+      MW_RETURN_IF_ERROR(RunJobs());
+      MW_RETURN_IF_ERROR(SetState(ReconstructionState::kJoining));
+      absl::StatusOr<Json> report = WriteResults();
+      const std::string lost = LostBlobOf(report.status());
+      if (lost.empty() || repairs == kMaxRepairs) return report;
+      MW_RETURN_IF_ERROR(work_->store().ReportDamagedBlob(WorkFolder::kReconstructionId, lost));
+    }
+  }
+
+  absl::Status SetState(ReconstructionState state) {
+    return work_->store().SetReconstructionState(WorkFolder::kReconstructionId, state, "", clock_.Now(),
+                                                 lease_->epoch());
   }
 
   absl::Status RunJobs() {
     ViewCache views([&](CameraIndex camera) { return LoadUnchangedView(camera); },
                     ViewCacheBytes(cameras_, options_, settings_));
-    const CameraJobInputMaker inputs(scene_, cameras_, views, work_->blobs(), options_.job.lattice_step);
-    JobRunner runner(scene_, inputs, options_.job, job_, *conductor_, work_->blobs(), pool_,
+    const CameraJobInputMaker inputs(scene_, cameras_, views, *blobs_, options_.job.lattice_step);
+    JobRunner runner({.scene = scene_,
+                      .inputs = inputs,
+                      .job = job_,
+                      .loop = *loop_,
+                      .lease = *lease_,
+                      .store = work_->store(),
+                      .blobs = *blobs_,
+                      .pool = pool_},
                      {.concurrent_jobs = ConcurrentJobs(options_, settings_.threads),
                       .memory_limit_bytes = settings_.memory_limit_bytes});
     TellCameras();
@@ -214,26 +251,27 @@ class LocalReconstruction {
   }
 
   void TellCameras() {
-    const Progress conducted = conductor_->progress();
+    const Progress conducted = loop_->conductor().progress();
     const double rays = std::max<double>(1, static_cast<double>(totals_.rays));
     progress_.share_covered = static_cast<double>(totals_.rays_covered_before) / rays;
     progress_.share_grown = static_cast<double>(totals_.rays_grown) / rays;
     progress_.share_accepted = static_cast<double>(conducted.patches_accepted) / rays;
-    Tell(LocalStage::kCameras, conducted.cameras_committed, conducted.cameras_total);
+    Tell(LocalStage::kCameras, static_cast<int>(conducted.cameras_committed),
+         static_cast<int>(conducted.cameras_total));
   }
 
   absl::StatusOr<Json> WriteResults() {
-    const std::vector<AcceptedSurface> surfaces = conductor_->AcceptedSurfaces();
+    const std::vector<AcceptedSurface> surfaces = loop_->conductor().AcceptedSurfaces();
     Tell(LocalStage::kJoining, 0, static_cast<int>(surfaces.size()));
     MW_ASSIGN_OR_RETURN(Json cameras,
                         MakeCamerasReport(scene_, work_->store(), WorkFolder::kReconstructionId, &totals_));
     if (surfaces.empty()) return absl::FailedPreconditionError(DescribeNothing(totals_, options_));
     if (!settings_.parts_folder.empty()) {
-      MW_RETURN_IF_ERROR(WriteParts(scene_, surfaces, work_->blobs(), settings_.parts_folder));
+      MW_RETURN_IF_ERROR(WriteParts(scene_, surfaces, *blobs_, settings_.parts_folder));
     }
     if (settings_.accepted_listener) {
       for (const AcceptedSurface& surface : surfaces) {
-        MW_ASSIGN_OR_RETURN(const PatchLattice accepted, LoadAcceptedSurface(work_->blobs(), surface));
+        MW_ASSIGN_OR_RETURN(const PatchLattice accepted, LoadAcceptedSurface(*blobs_, surface));
         settings_.accepted_listener(accepted);
       }
     }
@@ -241,8 +279,8 @@ class LocalReconstruction {
     int loaded = 0;  // each at least twice
     const auto loading = [&] { Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count); };
     const std::string ply_path = IsPly(*format_) ? settings_.output_path : work_->MeshPath();
-    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts, WriteAcceptedMesh(surfaces, work_->blobs(), options_.join,
-                                                                         scene_.offset, ply_path, pool_, loading));
+    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts,
+                        WriteAcceptedMesh(surfaces, *blobs_, options_.join, scene_.offset, ply_path, pool_, loading));
     if (counts.faces == 0) {
       std::error_code error;
       fs::remove(ply_path, error);
@@ -292,7 +330,7 @@ class LocalReconstruction {
     report["scene"] = {{"format", scene_.format},
                        {"photographs", scene_.views.size()},
                        {"sparse_points", scene_.points.size()},
-                       {"pairs", PairsToJson(*conductor_)}};
+                       {"pairs", PairsToJson(loop_->conductor())}};
     // world = local + offset
     if (!scene_.offset.isZero(0)) report["scene"]["offset"] = {scene_.offset.x(), scene_.offset.y(), scene_.offset.z()};
     report["options"] = ToJson(options_);
@@ -320,7 +358,9 @@ class LocalReconstruction {
   const MeshFormat* format_ = nullptr;
   std::vector<Camera> cameras_;
   std::unique_ptr<WorkFolder> work_;
-  std::unique_ptr<Conductor> conductor_;
+  std::optional<LostBlobNamer> blobs_;  // of the work folder
+  std::optional<HeldConductorLease> lease_;
+  std::unique_ptr<OuterLoop> loop_;
   ReportTotals totals_;
   LocalProgress progress_;
 };

@@ -8,6 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include "common/base/bad_input.h"
 #include "common/base/check.h"
@@ -100,6 +101,30 @@ class LocalReconstructionTest : public testing::Test {
         [this](const LocalProgress& progress) { last_progress_ = progress; });
   }
 
+  // Ends with an error when so many jobs have run.
+  absl::StatusOr<nlohmann::ordered_json> RunUntil(int jobs, const LocalSettings& settings) {
+    jobs_ = 0;
+    const std::string path = scene_.views[6].image_path;
+    LocalSettings without_cache = settings;
+    without_cache.memory_limit_bytes = 1;  // nothing decoded is kept
+    auto broken = ReconstructLocally(
+        scene_, options_, without_cache,
+        [&](const CameraJobInput& input, ThreadPool&) {
+          if (jobs_ == jobs) fs::rename(path, path + ".away");
+          return QuickJob(input);
+        },
+        [](const LocalProgress&) {});
+    fs::rename(path + ".away", path);
+    return broken;
+  }
+
+  static void RunSql(const std::string& path, const std::string& sql) {
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
+    ASSERT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(database);
+    sqlite3_close(database);
+  }
+
   std::string folder_;
   Scene scene_;
   ReconstructionOptions options_;
@@ -139,28 +164,72 @@ TEST_F(LocalReconstructionTest, GoesOnAfterAPhotographWasGoneForAWhile) {
   const int jobs_of_a_whole_run = jobs_;
 
   // Gone after the check at the beginning, before the jobs need it.
-  jobs_ = 0;
   const std::string path = scene_.views[6].image_path;
-  LocalSettings settings = Settings("broken", 2);
-  settings.memory_limit_bytes = 1;  // nothing decoded is kept
-  const auto broken = ReconstructLocally(
-      scene_, options_, settings,
-      [&](const CameraJobInput& input, ThreadPool&) {
-        if (jobs_ == 3) fs::rename(path, path + ".away");
-        return QuickJob(input);
-      },
-      [](const LocalProgress&) {});
+  const auto broken = RunUntil(3, Settings("broken", 2));
   ASSERT_FALSE(broken.ok());
   EXPECT_TRUE(IsBadInput(broken.status()));
   EXPECT_THAT(std::string(broken.status().message()), testing::HasSubstr(path));
   EXPECT_FALSE(fs::exists(folder_ + "/broken.ply"));
 
-  fs::rename(path + ".away", path);
   const auto resumed = Run(Settings("broken", 2));
   ASSERT_TRUE(resumed.ok()) << resumed.status();
   EXPECT_GT((*resumed)["process"]["cameras_done_before"], 0);
   EXPECT_TRUE(*ReadFile(folder_ + "/whole.ply") == *ReadFile(folder_ + "/broken.ply"));
   EXPECT_LT(jobs_, 2 * jobs_of_a_whole_run);
+}
+
+// Work folders of the version before: nothing is leased in them, nobody conducts, and no job says what it needs.
+TEST_F(LocalReconstructionTest, GoesOnInAWorkFolderOfTheVersionBefore) {
+  ASSERT_TRUE(Run(Settings("whole", 1)).ok());
+  const std::string as_before =
+      "DELETE FROM conductor_leases; PRAGMA user_version = 4;"
+      "UPDATE camera_jobs SET epoch = 1, lease_worker = NULL, lease_expires_at = NULL, lease_instance = NULL,"
+      "  leased_at = NULL, memory_bytes = 0, last_ending = 'lost', last_ended_at = 5 WHERE state = 'assigned';";
+  ASSERT_FALSE(RunUntil(4, Settings("half", 1)).ok());
+  RunSql(folder_ + "/half.work/state.sqlite", as_before);
+  const auto half = Run(Settings("half", 2));
+  ASSERT_TRUE(half.ok()) << half.status();
+  EXPECT_GT((*half)["process"]["cameras_done_before"], 0);
+  EXPECT_TRUE(*ReadFile(folder_ + "/whole.ply") == *ReadFile(folder_ + "/half.ply"));
+
+  // Its cameras were done, and its mesh was not there yet.
+  LocalSettings settings = Settings("done", 1);
+  settings.keep_work_folder = true;
+  ASSERT_TRUE(Run(settings).ok());
+  RunSql(folder_ + "/done.work/state.sqlite",
+         as_before + "UPDATE reconstructions SET state = 'done', finished_at = 5;");
+  fs::remove(folder_ + "/done.ply");
+  jobs_ = 0;
+  const auto done = Run(settings);
+  ASSERT_TRUE(done.ok()) << done.status();
+  EXPECT_EQ(jobs_, 0);
+  EXPECT_TRUE(*ReadFile(folder_ + "/whole.ply") == *ReadFile(folder_ + "/done.ply"));
+
+  // One whose jobs are not described in the store cannot go on, and says so.
+  ASSERT_FALSE(RunUntil(4, Settings("old", 1)).ok());
+  RunSql(folder_ + "/old.work/state.sqlite", as_before + "UPDATE camera_jobs SET spec = '' WHERE state = 'assigned';");
+  const auto old = Run(Settings("old", 1));
+  EXPECT_TRUE(absl::IsDataLoss(old.status())) << old.status();
+  EXPECT_THAT(std::string(old.status().message()), testing::HasSubstr("specification"));
+}
+
+TEST_F(LocalReconstructionTest, LostSurfacesAreMadeAgain) {
+  ASSERT_TRUE(Run(Settings("whole", 1)).ok());
+  LocalSettings settings = Settings("mesh", 2);
+  settings.keep_work_folder = true;
+  ASSERT_TRUE(Run(settings).ok());
+  fs::remove_all(settings.work_folder + "/blobs");
+  fs::remove(settings.output_path);
+  const auto again = Run(settings);
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_TRUE(*ReadFile(folder_ + "/whole.ply") == *ReadFile(settings.output_path));
+
+  // Half way, what accepted surfaces hide has to be there for the jobs too.
+  ASSERT_FALSE(RunUntil(6, Settings("half", 2)).ok());
+  fs::remove_all(folder_ + "/half.work/blobs");
+  const auto half = Run(Settings("half", 2));
+  ASSERT_TRUE(half.ok()) << half.status();
+  EXPECT_TRUE(*ReadFile(folder_ + "/whole.ply") == *ReadFile(folder_ + "/half.ply"));
 }
 
 TEST_F(LocalReconstructionTest, NothingReconstructedIsAFailureThatSaysWhy) {

@@ -41,13 +41,13 @@ TEST_F(WorkFolderTest, GoesOnWithWhatItHolds) {
     ASSERT_TRUE(folder.ok()) << folder.status();
     EXPECT_FALSE((*folder)->resumed());
     digest = *(*folder)->blobs().Put("surface");
-    ASSERT_TRUE((*folder)->store().AssignCameraJob(WorkFolder::kReconstructionId, {1, 4, 0}, clock_.Now()).ok());
+    ASSERT_TRUE((*folder)->store().AddBlobRef(WorkFolder::kReconstructionId, digest).ok());
   }
   auto folder = Open('a', R"({"window":3})");
   ASSERT_TRUE(folder.ok()) << folder.status();
   EXPECT_TRUE((*folder)->resumed());
   EXPECT_EQ(*(*folder)->blobs().Get(digest), "surface");
-  EXPECT_EQ((*folder)->store().ListCameraJobs(WorkFolder::kReconstructionId)->size(), 1);
+  EXPECT_EQ((*folder)->store().GetReconstruction(WorkFolder::kReconstructionId)->options_json, R"({"window":3})");
 }
 
 TEST_F(WorkFolderTest, NamesWhatDiffers) {

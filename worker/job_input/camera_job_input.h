@@ -37,8 +37,6 @@ class CameraJobInputMaker {
   int lattice_step() const { return lattice_step_; }  // px
   const Camera& camera(CameraIndex index) const { return cameras_[static_cast<size_t>(index)]; }
 
-  int64_t EstimateBytes(const CameraJobSpec& spec) const { return EstimateInputBytes(spec, cameras_, lattice_step_); }
-
  private:
   absl::Status LoadViews(const CameraJobSpec& spec, CameraJobInput& input, ThreadPool& pool) const;
   absl::Status AddAcceptedSurfaces(const CameraJobSpec& spec, CameraJobInput& input, ThreadPool& pool) const;

@@ -39,36 +39,38 @@ SELECT (SELECT count(*) FROM reconstructions WHERE owner = :owner AND state <> '
 -- name: set_reconstruction_scene
 UPDATE reconstructions SET scene_digest = :scene_digest, scene_blob = :scene_blob
 WHERE id = :id AND state IN ('created', 'preparing')
-  AND (CAST(:conductor_epoch AS BIGINT) = 0
-       OR EXISTS (SELECT 1 FROM conductor_leases
-                  WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */));
+  AND EXISTS (SELECT 1 FROM conductor_leases
+              WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */);
+
+-- name: request_reconstruction_state
+UPDATE reconstructions
+SET state = :state, state_reason = '',
+    finished_at = CASE WHEN CAST(:is_final AS INTEGER) = 1 THEN CAST(:now AS BIGINT) ELSE finished_at END
+WHERE id = :id AND state NOT IN ('done', 'cancelled', 'failed', 'deleting');
 
 -- name: set_reconstruction_state
 UPDATE reconstructions
 SET state = :state, state_reason = :reason,
     finished_at = CASE WHEN CAST(:is_final AS INTEGER) = 1 THEN CAST(:now AS BIGINT) ELSE finished_at END
 WHERE id = :id AND state NOT IN ('done', 'cancelled', 'failed', 'deleting')
-  AND (CAST(:conductor_epoch AS BIGINT) = 0
-       OR EXISTS (SELECT 1 FROM conductor_leases
-                  WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */));
+  AND EXISTS (SELECT 1 FROM conductor_leases
+              WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */);
 
 -- name: finish_reconstruction
 UPDATE reconstructions
 SET state = 'done', finished_at = :now, mesh_digest = :mesh_digest, mesh_bytes = :mesh_bytes, vertices = :vertices,
     faces = :faces
 WHERE id = :id AND state NOT IN ('done', 'cancelled', 'failed', 'deleting')
-  AND (CAST(:conductor_epoch AS BIGINT) = 0
-       OR EXISTS (SELECT 1 FROM conductor_leases
-                  WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */));
+  AND EXISTS (SELECT 1 FROM conductor_leases
+              WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */);
 
 -- name: set_progress
 UPDATE reconstructions
 SET cameras_total = :cameras_total, cameras_committed = :cameras_committed, cameras_set_aside = :cameras_set_aside,
     cameras_in_flight = :cameras_in_flight, patches_filtered = :patches_filtered, patches_accepted = :patches_accepted
 WHERE id = :id
-  AND (CAST(:conductor_epoch AS BIGINT) = 0
-       OR EXISTS (SELECT 1 FROM conductor_leases
-                  WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */));
+  AND EXISTS (SELECT 1 FROM conductor_leases
+              WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */);
 
 -- name: begin_deletion
 UPDATE reconstructions SET state = 'deleting' WHERE id = :id AND state <> 'deleting';
@@ -80,15 +82,9 @@ DELETE FROM reconstructions WHERE id = :id;
 INSERT INTO camera_jobs (reconstruction_id, sequence, camera, snapshot, assigned_at, memory_bytes, neighbours, spec)
 SELECT CAST(:id AS TEXT), CAST(:sequence AS INTEGER), CAST(:camera AS INTEGER), CAST(:snapshot AS INTEGER),
        CAST(:now AS BIGINT), CAST(:memory_bytes AS BIGINT), CAST(:neighbours AS TEXT), CAST(:spec AS TEXT)
-WHERE (CAST(:conductor_epoch AS BIGINT) = 0
-       OR EXISTS (SELECT 1 FROM conductor_leases
-                  WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */))
+WHERE EXISTS (SELECT 1 FROM conductor_leases
+              WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */)
 ON CONFLICT DO NOTHING;
-
--- name: reassign_camera_job
-UPDATE camera_jobs SET epoch = epoch + 1, assigned_at = :now, lease_worker = NULL, lease_expires_at = NULL
-WHERE reconstruction_id = :id AND sequence = :sequence AND state = 'assigned'
-RETURNING epoch;
 
 -- name: complete_camera_job
 UPDATE camera_jobs
@@ -113,9 +109,8 @@ SET state = 'assigned', epoch = epoch + 1, expected_digest = :expected_digest, f
     out_of_memory_failures = CASE WHEN CAST(:expected_digest AS TEXT) IS NULL THEN out_of_memory_failures ELSE 0 END,
     losses = CASE WHEN CAST(:expected_digest AS TEXT) IS NULL THEN losses ELSE 0 END
 WHERE reconstruction_id = :id AND sequence = :sequence AND epoch = :epoch AND state = 'done'
-  AND (CAST(:conductor_epoch AS BIGINT) = 0
-       OR EXISTS (SELECT 1 FROM conductor_leases
-                  WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */));
+  AND EXISTS (SELECT 1 FROM conductor_leases
+              WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */);
 
 -- name: get_camera_job
 SELECT reconstruction_id, sequence, camera, snapshot, state, epoch, filtered_digest, weak_targets, report_json,
@@ -194,9 +189,8 @@ INSERT INTO commits (reconstruction_id, sequence, camera, accepted_digest, filte
 SELECT CAST(:id AS TEXT), CAST(:sequence AS INTEGER), CAST(:camera AS INTEGER), CAST(:accepted_digest AS TEXT),
        CAST(:filtered_patches AS BIGINT), CAST(:accepted_patches AS BIGINT), CAST(:now AS BIGINT)
 WHERE NOT EXISTS (SELECT 1 FROM commits WHERE reconstruction_id = :id AND sequence = :sequence)
-  AND (CAST(:conductor_epoch AS BIGINT) = 0
-       OR EXISTS (SELECT 1 FROM conductor_leases
-                  WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */))
+  AND EXISTS (SELECT 1 FROM conductor_leases
+              WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */)
 ON CONFLICT DO NOTHING;
 
 -- name: get_commit

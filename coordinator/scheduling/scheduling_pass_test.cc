@@ -1,4 +1,4 @@
-#include "coordinator/dispatch/scheduling_pass.h"
+#include "coordinator/scheduling/scheduling_pass.h"
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -36,23 +36,11 @@ OpenJob Leased(const std::string& id, SequenceNumber sequence, const std::string
   return job;
 }
 
-v1::SynchronizeRequest Worker(const std::string& id, int cores = 1, int64_t memory_bytes = 1000) {
-  v1::SynchronizeRequest request;
-  request.set_worker_id(id);
-  request.set_instance("1");
-  request.set_cores(cores);
-  request.set_memory_bytes(memory_bytes);
-  return request;
+WorkerReport Worker(const std::string& id, int cores = 1, int64_t memory_bytes = 1000) {
+  return {.worker = id, .instance = "1", .cores = cores, .memory_bytes = memory_bytes};
 }
 
-v1::HeldJob& Hold(v1::SynchronizeRequest& request, const OpenJob& job) {
-  v1::HeldJob& held = *request.add_held();
-  held.mutable_key()->set_reconstruction_id(job.reconstruction_id);
-  held.mutable_key()->set_sequence(job.sequence);
-  held.mutable_key()->set_epoch(job.epoch);
-  held.mutable_running();
-  return held;
-}
+HeldJob& Hold(WorkerReport& report, const OpenJob& job) { return report.held.emplace_back(HeldJob{KeyOf(job), {}}); }
 
 SchedulingPass Plan(std::vector<OpenJob> jobs, absl::Time now = kNow) {
   return SchedulingPass(kLease, kRetry, std::move(jobs), now, [](const OpenJob&) {
@@ -89,9 +77,9 @@ TEST(SchedulingPassTest, WhatItHoldsAlreadyCounts) {
 
 TEST(SchedulingPassTest, ADrainingWorkerGetsNothing) {
   SchedulingPass plan = Plan({Waiting("a", 1)});
-  v1::SynchronizeRequest request = Worker("w");
-  request.set_draining(true);
-  plan.Grant(request);
+  WorkerReport report = Worker("w");
+  report.draining = true;
+  plan.Grant(report);
   EXPECT_THAT(Changes(plan), IsEmpty());
 }
 
@@ -130,10 +118,10 @@ TEST(SchedulingPassTest, BackoffIsWaitedFor) {
 TEST(SchedulingPassTest, ASilentWorkerLosesItsLeasesAndAHeardOneKeepsThem) {
   const OpenJob silent = Leased("a", 1, "s", absl::Seconds(31));
   const OpenJob heard = Leased("a", 2, "h", absl::Seconds(31));
-  v1::SynchronizeRequest request = Worker("h");
-  Hold(request, heard);
+  WorkerReport report = Worker("h");
+  Hold(report, heard);
   SchedulingPass plan = Plan({silent, heard});
-  EXPECT_FALSE(plan.ApplyReport(request));
+  EXPECT_FALSE(plan.ApplyReport(report));
   plan.Expire(true);
   EXPECT_THAT(Changes(plan), ElementsAre("renew a2", "lose a1"));
   EXPECT_EQ(plan.changes()[1].change.only_if_expired_at, kNow);
@@ -146,35 +134,35 @@ TEST(SchedulingPassTest, ASilentWorkerLosesItsLeasesAndAHeardOneKeepsThem) {
 TEST(SchedulingPassTest, AWorkerThatHangsAndIsAliveLosesTheJobToo) {
   OpenJob job = Leased("a", 1, "w", absl::Seconds(101));
   job.lease_expires_at = kNow + absl::Seconds(5);
-  v1::SynchronizeRequest request = Worker("w");
-  Hold(request, job);
+  WorkerReport report = Worker("w");
+  Hold(report, job);
   SchedulingPass plan = Plan({job});
-  plan.ApplyReport(request);
+  plan.ApplyReport(report);
   plan.Expire(true);
   ASSERT_THAT(Changes(plan), ElementsAre("fail a1"));
   EXPECT_THAT(plan.changes()[0].change.reason, HasSubstr("took longer"));
 }
 
 TEST(SchedulingPassTest, ANewProcessOfAWorkerHasLostWhatTheOldOneHeld) {
-  v1::SynchronizeRequest request = Worker("w");
-  request.set_instance("2");
+  WorkerReport report = Worker("w");
+  report.instance = "2";
   SchedulingPass plan = Plan({Leased("a", 1, "w")});
-  plan.ApplyReport(request);
-  plan.Grant(request);
+  plan.ApplyReport(report);
+  plan.Grant(report);
   EXPECT_THAT(Changes(plan), ElementsAre("lose a1"));
   EXPECT_THAT(plan.HeldBy("w", "2"), IsEmpty());
 }
 
 TEST(SchedulingPassTest, WhatRanOutOfMemoryIsMadeSmallerAndThenSkipped) {
-  v1::SynchronizeRequest request = Worker("w");
-  request.set_instance("2");
-  request.set_ran_out_of_memory(true);
+  WorkerReport report = Worker("w");
+  report.instance = "2";
+  report.ran_out_of_memory = true;
   OpenJob job = Leased("a", 1, "w");
   for (int64_t attempt = 0; attempt < 2; ++attempt) {
     job.failed_attempts = attempt;
     job.reduction = attempt;
     SchedulingPass plan = Plan({job});
-    plan.ApplyReport(request);
+    plan.ApplyReport(report);
     ASSERT_THAT(Changes(plan), ElementsAre("fail a1"));
     EXPECT_TRUE(plan.changes()[0].change.out_of_memory);
     EXPECT_TRUE(plan.changes()[0].change.reduce);
@@ -183,58 +171,57 @@ TEST(SchedulingPassTest, WhatRanOutOfMemoryIsMadeSmallerAndThenSkipped) {
   job.failed_attempts = 2;
   job.reduction = 2;
   SchedulingPass plan = Plan({job});
-  plan.ApplyReport(request);
+  plan.ApplyReport(report);
   EXPECT_THAT(Changes(plan), ElementsAre("skip a1"));
 }
 
 TEST(SchedulingPassTest, FailuresBackOffAndEnd) {
-  v1::SynchronizeRequest request = Worker("w");
+  WorkerReport report = Worker("w");
   OpenJob job = Leased("a", 1, "w");
-  Hold(request, job).mutable_failed()->set_reason("broken");
+  Hold(report, job).outcome = JobFailed{.reason = "broken"};
   for (int64_t before = 0; before < 2; ++before) {
     job.failed_attempts = before;
     SchedulingPass plan = Plan({job});
-    EXPECT_TRUE(plan.ApplyReport(request));
+    EXPECT_TRUE(plan.ApplyReport(report));
     ASSERT_THAT(Changes(plan), ElementsAre("fail a1"));
     EXPECT_EQ(plan.changes()[0].change.retry_at, kNow + absl::Seconds(1 << before));
     EXPECT_FALSE(plan.changes()[0].change.reduce);
   }
   job.failed_attempts = 2;
   SchedulingPass plan = Plan({job});
-  plan.ApplyReport(request);
+  plan.ApplyReport(report);
   ASSERT_THAT(Changes(plan), ElementsAre("skip a1"));
   EXPECT_EQ(plan.changes()[0].change.reason, "broken");
   // A camera that is committed already cannot be skipped.
   job.is_repair = true;
   SchedulingPass repair = Plan({job});
-  repair.ApplyReport(request);
+  repair.ApplyReport(report);
   EXPECT_THAT(Changes(repair), ElementsAre("fail a1"));
 }
 
 TEST(SchedulingPassTest, LosingWorkersCountsApartAndEndsToo) {
-  v1::SynchronizeRequest request = Worker("w");
+  WorkerReport report = Worker("w");
   OpenJob job = Leased("a", 1, "w");
-  Hold(request, job).mutable_failed()->set_infrastructure(true);
+  Hold(report, job).outcome = JobFailed{.infrastructure = true};
   job.losses = 3;
   SchedulingPass plan = Plan({job});
-  plan.ApplyReport(request);
+  plan.ApplyReport(report);
   ASSERT_THAT(Changes(plan), ElementsAre("lose a1"));
   EXPECT_EQ(plan.changes()[0].change.retry_at, kNow + absl::Seconds(4));
   job.losses = 4;
   SchedulingPass last = Plan({job});
-  last.ApplyReport(request);
+  last.ApplyReport(report);
   EXPECT_THAT(Changes(last), ElementsAre("skip a1"));
 }
 
 TEST(SchedulingPassTest, ResultsAreTakenFromTheHolderOrFromWhoWasLateAndIsTheOnlyOne) {
   const auto changes_of = [](const OpenJob& job, int64_t epoch, const std::string& worker) {
-    v1::SynchronizeRequest request = Worker(worker);
-    v1::HeldJob& held = Hold(request, job);
-    held.mutable_key()->set_epoch(epoch);
-    held.mutable_finished()->set_filtered_digest(std::string(64, 'a'));
-    held.mutable_finished()->set_report_json("{}");
+    WorkerReport report = Worker(worker);
+    HeldJob& held = Hold(report, job);
+    held.key.epoch = epoch;
+    held.outcome = JobFinished{.filtered_digest = std::string(64, 'a'), .report_json = "{}"};
     SchedulingPass plan = Plan({job});
-    EXPECT_TRUE(plan.ApplyReport(request));
+    EXPECT_TRUE(plan.ApplyReport(report));
     return Changes(plan);
   };
   OpenJob job = Leased("a", 1, "w");
@@ -249,32 +236,31 @@ TEST(SchedulingPassTest, ResultsAreTakenFromTheHolderOrFromWhoWasLateAndIsTheOnl
 TEST(SchedulingPassTest, AResultThatIsNoneIsAFailure) {
   const OpenJob job = Leased("a", 1, "w");
   for (const bool bad_digest : {true, false}) {
-    v1::SynchronizeRequest request = Worker("w");
-    v1::HeldJob& held = Hold(request, job);
-    held.mutable_finished()->set_filtered_digest(bad_digest ? "../x" : std::string(64, 'a'));
-    held.mutable_finished()->set_report_json(bad_digest ? "{}" : "{");
+    WorkerReport report = Worker("w");
+    Hold(report, job).outcome = JobFinished{.filtered_digest = bad_digest ? "../x" : std::string(64, 'a'),
+                                            .report_json = bad_digest ? "{}" : "{"};
     SchedulingPass plan = Plan({job});
-    plan.ApplyReport(request);
+    plan.ApplyReport(report);
     EXPECT_THAT(Changes(plan), ElementsAre("fail a1"));
   }
 }
 
 TEST(SchedulingPassTest, ABlobThatCannotBeReadIsReportedAndNotTheJobsFault) {
   const OpenJob job = Leased("a", 1, "w");
-  v1::SynchronizeRequest request = Worker("w");
-  Hold(request, job).mutable_failed()->set_damaged_blob(std::string(64, 'b'));
+  WorkerReport report = Worker("w");
+  Hold(report, job).outcome = JobFailed{.damaged_blob = std::string(64, 'b')};
   SchedulingPass plan = Plan({job});
-  plan.ApplyReport(request);
+  plan.ApplyReport(report);
   EXPECT_THAT(Changes(plan), ElementsAre("lose a1"));
   EXPECT_THAT(plan.damaged_blobs(), ElementsAre(testing::Pair("a", std::string(64, 'b'))));
 }
 
 TEST(SchedulingPassTest, WhatIsGivenBackCountsForNothing) {
   const OpenJob job = Leased("a", 1, "w");
-  v1::SynchronizeRequest request = Worker("w");
-  Hold(request, job).mutable_released();
+  WorkerReport report = Worker("w");
+  Hold(report, job).outcome = JobReleased{};
   SchedulingPass plan = Plan({job});
-  EXPECT_TRUE(plan.ApplyReport(request));
+  EXPECT_TRUE(plan.ApplyReport(report));
   EXPECT_THAT(Changes(plan), ElementsAre("release a1"));
 }
 

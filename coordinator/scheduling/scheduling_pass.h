@@ -11,8 +11,7 @@
 #include <absl/status/status.h>
 #include <absl/time/time.h>
 
-#include "meshwright/v1/worker.pb.h"
-
+#include "coordinator/scheduling/worker_report.h"
 #include "coordinator/store/job_store.h"
 
 namespace meshwright {
@@ -32,35 +31,26 @@ struct RetryOptions {
   absl::Duration max_backoff = absl::Minutes(1);
 };
 
-// Names one handing-out of one camera job.
-struct JobKey {
-  std::string reconstruction;
-  SequenceNumber sequence = 0;
-  int64_t epoch = 0;
-
-  auto operator<=>(const JobKey&) const = default;
-};
-
-// What a coordinator decides in one turn, from what the store says about open jobs and what workers have said since the
-// turn before. Pure: no threads, no clock, no store. What it decides is a list of changes, each fenced in the store, so
-// that several coordinators may decide at the same time.
+// What is decided in one pass over the open jobs, from what the store says about them and what workers have said since
+// the pass before. Pure: no threads, no clock, no store. What it decides is a list of changes, each fenced in the
+// store, so that several coordinators may decide at the same time.
 class SchedulingPass {
  public:
   // What a job needs when it is made smaller 0, 1, 2 ... times, bytes.
   using MemorySteps = std::function<std::vector<int64_t>(const OpenJob& job)>;
 
-  // `options` outlive the plan.
+  // `lease` and `retry` outlive the pass.
   SchedulingPass(const LeaseOptions& lease, const RetryOptions& retry, std::vector<OpenJob> open, absl::Time now,
                  MemorySteps memory_steps);
 
   // What a worker says: results, failures, what runs. Ends what an earlier process of it held. Returns whether there
   // was something that the worker waits to be rid of.
-  bool ApplyReport(const v1::SynchronizeRequest& request);
+  bool ApplyReport(const WorkerReport& report);
   // Ends leases that ran out, or of jobs that take too long.
   void Expire(bool silence_counts);
   // Gives the worker what it can take: of the reconstruction with the fewest leases for its weight first, of one
   // reconstruction by sequence.
-  void Grant(const v1::SynchronizeRequest& request);
+  void Grant(const WorkerReport& report);
 
   struct Change {
     JobChange change;
@@ -80,7 +70,10 @@ class SchedulingPass {
 
  private:
   JobChange LossOf(const OpenJob& job, const std::string& reason, bool out_of_memory) const;
-  void ApplyHeldJob(const v1::SynchronizeRequest& request, const v1::HeldJob& held);
+  void ApplyHeldJob(const WorkerReport& report, const HeldJob& held);
+  void ApplyFinished(size_t job, bool is_leased, const JobFinished& finished);
+  void ApplyFailed(size_t job, const JobFailed& failed);
+  void ApplyRunning(size_t job);
   void Add(size_t job, JobChange change);
   bool Fits(const OpenJob& job, int64_t free_bytes) const;
 
@@ -89,7 +82,7 @@ class SchedulingPass {
   const absl::Time now_;
   const MemorySteps memory_steps_;
   std::vector<OpenJob> jobs_;
-  std::vector<bool> changed_;  // this turn has decided about the job
+  std::vector<bool> changed_;  // this pass has decided about the job
   std::map<std::pair<std::string, SequenceNumber>, size_t> by_name_;
   std::map<std::string, std::set<size_t>> by_worker_;
   struct Share {

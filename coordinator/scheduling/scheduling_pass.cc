@@ -1,4 +1,4 @@
-#include "coordinator/dispatch/scheduling_pass.h"
+#include "coordinator/scheduling/scheduling_pass.h"
 
 #include <algorithm>
 
@@ -105,73 +105,76 @@ JobChange SchedulingPass::LossOf(const OpenJob& job, const std::string& reason, 
   return change;
 }
 
-bool SchedulingPass::ApplyReport(const v1::SynchronizeRequest& request) {
-  const std::set<size_t> held_before = by_worker_[request.worker_id()];
+bool SchedulingPass::ApplyReport(const WorkerReport& report) {
+  const std::set<size_t> held_before = by_worker_[report.worker];
   for (const size_t job : held_before) {
-    if (jobs_[job].lease_instance == request.instance() || changed_[job]) continue;
+    if (jobs_[job].lease_instance == report.instance || changed_[job]) continue;
     Add(job, LossOf(jobs_[job],
-                    absl::StrCat("worker ", request.worker_id(),
-                                 request.ran_out_of_memory() ? " ran out of memory" : " was started anew"),
-                    request.ran_out_of_memory()));
+                    absl::StrCat("worker ", report.worker,
+                                 report.ran_out_of_memory ? " ran out of memory" : " was started anew"),
+                    report.ran_out_of_memory));
   }
   bool settled = false;
-  for (const v1::HeldJob& held : request.held()) {
-    ApplyHeldJob(request, held);
-    settled = settled || held.outcome_case() != v1::HeldJob::kRunning;
+  for (const HeldJob& held : report.held) {
+    ApplyHeldJob(report, held);
+    settled = settled || !std::holds_alternative<JobRunning>(held.outcome);
   }
   return settled;
 }
 
-void SchedulingPass::ApplyHeldJob(const v1::SynchronizeRequest& request, const v1::HeldJob& held) {
-  const auto found = by_name_.find({held.key().reconstruction_id(), held.key().sequence()});
+void SchedulingPass::ApplyHeldJob(const WorkerReport& report, const HeldJob& held) {
+  const auto found = by_name_.find({held.key.reconstruction, held.key.sequence});
   if (found == by_name_.end()) return;
   const size_t index = found->second;
   const OpenJob& job = jobs_[index];
   // Taken already, or somebody else has the job now.
-  if (job.epoch != held.key().epoch() || changed_[index]) return;
-  const bool is_leased = job.lease_worker == request.worker_id() && job.lease_instance == request.instance();
+  if (job.epoch != held.key.epoch || changed_[index]) return;
+  const bool is_leased = job.lease_worker == report.worker && job.lease_instance == report.instance;
   if (!is_leased && !job.lease_worker.empty()) return;
-  switch (held.outcome_case()) {
-    case v1::HeldJob::kFinished: {
-      // Also when the lease ran out and nobody has taken the job over.
-      const v1::HeldJob::Finished& finished = held.finished();
-      const bool is_report = ParseJson(finished.report_json()).ok();
-      if (!ValidateDigest(finished.filtered_digest()).ok() || !is_report) {
-        if (is_leased) {
-          Add(index, FailureOf(job, is_report ? "filtered_digest: no digest" : "report_json: no JSON", false));
-        }
-        return;
-      }
-      JobChange change = ChangeOf(JobChange::Kind::kComplete, job);
-      change.filtered_digest = finished.filtered_digest();
-      change.weak_targets.assign(finished.weak_targets().begin(), finished.weak_targets().end());
-      change.report_json = finished.report_json();
-      Add(index, std::move(change));
-      return;
-    }
-    case v1::HeldJob::kFailed: {
-      if (!is_leased) return;
-      const v1::HeldJob::Failed& failed = held.failed();
-      const bool is_damage = ValidateDigest(failed.damaged_blob()).ok();
-      if (is_damage) damaged_blobs_.emplace_back(job.reconstruction_id, failed.damaged_blob());
-      Add(index, failed.infrastructure() || is_damage ? LossOf(job, failed.reason(), false)
-                                                      : FailureOf(job, failed.reason(), failed.out_of_memory()));
-      return;
-    }
-    case v1::HeldJob::kReleased: {
-      if (is_leased) Add(index, ChangeOf(JobChange::Kind::kRelease, job));
-      return;
-    }
-    case v1::HeldJob::kRunning:
-    case v1::HeldJob::OUTCOME_NOT_SET: {
-      if (!is_leased || job.lease_expires_at - now_ > kRenewBelow * lease_.lease) return;
-      if (now_ - job.leased_at > lease_.job_time_limit) return;  // Expire() sees to it
-      JobChange change = ChangeOf(JobChange::Kind::kRenew, job);
-      change.expires_at = now_ + lease_.lease;
-      Add(index, std::move(change));
-      return;
-    }
+  if (const auto* const finished = std::get_if<JobFinished>(&held.outcome)) {
+    ApplyFinished(index, is_leased, *finished);
+  } else if (!is_leased) {
+    return;
+  } else if (const auto* const failed = std::get_if<JobFailed>(&held.outcome)) {
+    ApplyFailed(index, *failed);
+  } else if (std::holds_alternative<JobReleased>(held.outcome)) {
+    Add(index, ChangeOf(JobChange::Kind::kRelease, job));
+  } else {
+    ApplyRunning(index);
   }
+}
+
+// Also when the lease ran out and nobody has taken the job over.
+void SchedulingPass::ApplyFinished(size_t index, bool is_leased, const JobFinished& finished) {
+  const OpenJob& job = jobs_[index];
+  const bool is_report = ParseJson(finished.report_json).ok();
+  if (!ValidateDigest(finished.filtered_digest).ok() || !is_report) {
+    if (!is_leased) return;
+    Add(index, FailureOf(job, is_report ? "filtered_digest: no digest" : "report_json: no JSON", false));
+    return;
+  }
+  JobChange change = ChangeOf(JobChange::Kind::kComplete, job);
+  change.filtered_digest = finished.filtered_digest;
+  change.weak_targets = finished.weak_targets;
+  change.report_json = finished.report_json;
+  Add(index, std::move(change));
+}
+
+void SchedulingPass::ApplyFailed(size_t index, const JobFailed& failed) {
+  const OpenJob& job = jobs_[index];
+  const bool is_damage = ValidateDigest(failed.damaged_blob).ok();
+  if (is_damage) damaged_blobs_.emplace_back(job.reconstruction_id, failed.damaged_blob);
+  Add(index, failed.infrastructure || is_damage ? LossOf(job, failed.reason, false)
+                                                : FailureOf(job, failed.reason, failed.out_of_memory));
+}
+
+void SchedulingPass::ApplyRunning(size_t index) {
+  const OpenJob& job = jobs_[index];
+  if (job.lease_expires_at - now_ > kRenewBelow * lease_.lease) return;
+  if (now_ - job.leased_at > lease_.job_time_limit) return;  // Expire() sees to it
+  JobChange change = ChangeOf(JobChange::Kind::kRenew, job);
+  change.expires_at = now_ + lease_.lease;
+  Add(index, std::move(change));
 }
 
 void SchedulingPass::Expire(bool silence_counts) {
@@ -192,12 +195,12 @@ bool SchedulingPass::Fits(const OpenJob& job, int64_t free_bytes) const {
   return job.not_before <= now_ && job.memory_bytes <= free_bytes;
 }
 
-void SchedulingPass::Grant(const v1::SynchronizeRequest& request) {
-  if (request.draining()) return;
-  std::set<size_t>& leases = by_worker_[request.worker_id()];
-  int64_t free_bytes = request.memory_bytes();
+void SchedulingPass::Grant(const WorkerReport& report) {
+  if (report.draining) return;
+  std::set<size_t>& leases = by_worker_[report.worker];
+  int64_t free_bytes = report.memory_bytes;
   for (const size_t job : leases) free_bytes -= jobs_[job].memory_bytes;
-  while (static_cast<int>(leases.size()) < request.cores()) {
+  while (static_cast<int>(leases.size()) < report.cores) {
     Share* best = nullptr;
     size_t best_job = 0;
     for (auto& [id, share] : shares_) {
@@ -210,8 +213,8 @@ void SchedulingPass::Grant(const v1::SynchronizeRequest& request) {
     }
     if (best == nullptr) return;
     JobChange change = ChangeOf(JobChange::Kind::kClaim, jobs_[best_job]);
-    change.worker = request.worker_id();
-    change.instance = request.instance();
+    change.worker = report.worker;
+    change.instance = report.instance;
     change.expires_at = now_ + lease_.lease;
     free_bytes -= jobs_[best_job].memory_bytes;
     Add(best_job, std::move(change));
