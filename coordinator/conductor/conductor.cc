@@ -1,6 +1,7 @@
 #include "coordinator/conductor/conductor.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -28,6 +29,38 @@ absl::Status CheckWeakTargets(const Assignment& assignment, const std::vector<Ca
   return absl::OkStatus();
 }
 
+// The bytes of a camera's numbers may differ in the last bits where another machine computed them.
+bool AreEqual(const Camera& a, const Camera& b) {
+  const auto close = [](double x, double y) { return std::abs(x - y) <= 1e-9 * std::max(1.0, std::abs(y)); };
+  bool equal = a.width == b.width && a.height == b.height && close(a.fx, b.fx) && close(a.fy, b.fy) &&
+               close(a.cx, b.cx) && close(a.cy, b.cy);
+  for (int i = 0; i < 3; ++i) {
+    equal = equal && close(a.cam_from_world.translation[i], b.cam_from_world.translation[i]);
+    for (int j = 0; j < 3; ++j) {
+      equal = equal && close(a.cam_from_world.rotation(i, j), b.cam_from_world.rotation(i, j));
+    }
+  }
+  return equal;
+}
+
+// A surface comes from outside: what it says of its camera and its lattice must be what the scene says, or nothing that
+// is computed with it has bounds.
+absl::Status CheckFits(const SparseSurface& surface, CameraIndex index, const Camera& camera, int lattice_step) {
+  if (surface.camera_index != index) {
+    return absl::InvalidArgumentError(absl::StrCat("is of camera ", surface.camera_index, ", expected ", index));
+  }
+  if (!AreEqual(surface.camera, camera)) {
+    return absl::InvalidArgumentError(absl::StrCat("its camera is not camera ", index, " of the scene"));
+  }
+  const Lattice& lattice = surface.lattice;
+  const Lattice expected = Lattice::For(camera, std::max(lattice.step, 1));
+  if (lattice.step < lattice_step || lattice.columns != expected.columns || lattice.rows != expected.rows) {
+    return absl::InvalidArgumentError(absl::StrCat("its lattice is ", lattice.columns, " x ", lattice.rows,
+                                                   " with step ", lattice.step, ", which is none of camera ", index));
+  }
+  return absl::OkStatus();
+}
+
 // Keeps the `count` surfaces with the most patches, in ascending order of cameras. Ties: the lower camera.
 template <typename Surface>
 void KeepLargest(int count, std::vector<Surface>& surfaces) {
@@ -45,6 +78,7 @@ Conductor::Conductor(std::string reconstruction_id, const std::vector<Camera>& c
                      OverlapGraph overlaps, const ConductorOptions& options, JobStore* store, BlobStore* blobs,
                      const Clock* clock, ThreadPool* pool, int64_t epoch, JobBytes job_bytes)
     : reconstruction_id_(std::move(reconstruction_id)),
+      scene_cameras_(cameras),
       cameras_(CameraGeometries(cameras)),
       probes_(std::move(pairs.probes)),
       pair_counts_(pairs.counts),
@@ -260,16 +294,15 @@ absl::Status Conductor::CommitWhatIsNext() {
 }
 
 absl::StatusOr<std::shared_ptr<const SparseSurface>> Conductor::LoadSurface(const std::string& digest,
-                                                                            CameraIndex expected_camera) {
+                                                                            CameraIndex camera) {
   const absl::StatusOr<std::string> bytes = blobs_->Get(digest);
   if (absl::IsDataLoss(bytes.status()) || absl::IsNotFound(bytes.status())) damaged_blob_ = digest;
   MW_RETURN_IF_ERROR(bytes.status());
   absl::StatusOr<SparseSurface> surface = DecodeSparseSurface(*bytes);
   if (!surface.ok()) return absl::InvalidArgumentError(surface.status().message());
-  if (surface->camera_index != expected_camera) {
-    return absl::InvalidArgumentError(absl::StrCat("surface ", digest, " is of camera ", surface->camera_index,
-                                                   ", expected camera ", expected_camera));
-  }
+  const absl::Status fits =
+      CheckFits(*surface, camera, scene_cameras_[static_cast<size_t>(camera)], options_.lattice_step);
+  if (!fits.ok()) return absl::InvalidArgumentError(absl::StrCat("surface ", digest, ": ", fits.message()));
   return std::make_shared<const SparseSurface>(*std::move(surface));
 }
 
@@ -293,7 +326,10 @@ absl::StatusOr<Commit> Conductor::Accept(SequenceNumber sequence, CameraIndex ca
   KeepLargest(options_.max_surfaces, supporters);
   const auto load = [&](int i) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     const Supporter& supporter = supporters[static_cast<size_t>(i)];
-    return LoadSurface(supporter.digest, supporter.camera);
+    absl::StatusOr<std::shared_ptr<const SparseSurface>> surface = LoadSurface(supporter.digest, supporter.camera);
+    // It was committed: not the fault of the camera that is next.
+    if (absl::IsInvalidArgument(surface.status())) surface = absl::DataLossError(surface.status().message());
+    return surface;
   };
   MW_ASSIGN_OR_RETURN(
       const AcceptanceResult result,

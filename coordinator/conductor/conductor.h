@@ -93,8 +93,8 @@ class Conductor {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Assign(const Assignment& assignment) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status Flush() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::StatusOr<std::shared_ptr<const SparseSurface>> LoadSurface(const std::string& digest,
-                                                                   CameraIndex expected_camera)
+  // InvalidArgument: it is no surface of this camera of the scene.
+  absl::StatusOr<std::shared_ptr<const SparseSurface>> LoadSurface(const std::string& digest, CameraIndex camera)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status Receive(const JobResult& result, int max_failures) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status Reject(const JobResult& result, const std::string& reason, int max_failures)
@@ -111,7 +111,8 @@ class Conductor {
   CameraJobSpec SpecFor(const Assignment& assignment) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::string reconstruction_id_;
-  const std::vector<CameraGeometry> cameras_;
+  const std::vector<Camera> scene_cameras_;
+  const std::vector<CameraGeometry> cameras_;  // of these
   const std::vector<CameraProbes> probes_;
   const FeasiblePairCounts pair_counts_;
   const FeasibilitySource feasibility_source_;

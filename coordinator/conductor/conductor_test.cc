@@ -309,6 +309,43 @@ TEST_F(ConductorTest, ResultsThatAreNoneAreTakenBackAndThenTheJobIsSkipped) {
   EXPECT_EQ(committed(), 1);
 }
 
+TEST_F(ConductorTest, ASurfaceOfAnotherCameraOrLatticeIsNone) {
+  options_.lattice_step = kStep;
+  StartAnew("run", options_);
+  CameraJobSpec spec = TakeJobs().front();
+  const PatchLattice right = FakeFilteredSurface(wall_, spec);
+  int runs = 0;
+  const auto expect_refused = [&](const PatchLattice& surface, const std::string& word) {
+    ASSERT_TRUE(Report(spec, *blobs_->Put(EncodeSurface(surface))).ok());
+    ASSERT_TRUE(loop_->Step().ok());
+    EXPECT_THAT(store_->GetCameraJob("wall", spec.sequence)->last_failure, testing::HasSubstr(word));
+    EXPECT_EQ(committed(), 0);
+    StartAnew(absl::StrCat("run", ++runs), options_);
+    spec = TakeJobs().front();
+  };
+  PatchLattice other = right;
+  ++other.camera_index;
+  expect_refused(other, "expected " + std::to_string(spec.camera));
+  for (const double off : {1e-3, 1e6}) {
+    other = right;
+    other.camera.cam_from_world.translation.x() += off;
+    expect_refused(other, "its camera");
+    other = right;
+    other.camera.fx += off;
+    expect_refused(other, "its camera");
+  }
+  Camera larger = right.camera;
+  larger.width = 8192;
+  larger.height = 8192;
+  expect_refused(PatchLattice::Empty(spec.camera, larger, kStep), "its camera");
+  expect_refused(PatchLattice::Empty(spec.camera, right.camera, 1), "its lattice");
+  // One that was made smaller.
+  ASSERT_TRUE(
+      Report(spec, *blobs_->Put(EncodeSurface(PatchLattice::Empty(spec.camera, right.camera, 2 * kStep)))).ok());
+  ASSERT_TRUE(loop_->Step().ok());
+  EXPECT_EQ(committed(), 1);
+}
+
 TEST_F(ConductorTest, AResultThatIsNoneDoesNotKeepAConductorFromOpening) {
   StartAnew("run", {});
   const CameraJobSpec spec = TakeJobs().front();

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
+#include <new>
 
 #include <absl/strings/str_cat.h>
 
@@ -122,7 +124,7 @@ absl::Status ReconstructionDriver::SetState(ReconstructionState state, const std
 
 void ReconstructionDriver::Run() {
   for (int failures = 1;; ++failures) {
-    const absl::Status status = Conduct();
+    const absl::Status status = ConductOrFail();
     {
       const MutexLock lock(mutex_);
       // Aborted: somebody else conducts it now.
@@ -133,6 +135,17 @@ void ReconstructionDriver::Run() {
       return;
     }
     if (!WaitToRetry()) return;
+  }
+}
+
+// Whatever a reconstruction's data does, it fails alone: the others of this process go on.
+absl::Status ReconstructionDriver::ConductOrFail() {
+  try {
+    return Conduct();
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError("the coordinator has not enough memory for it");
+  } catch (const std::exception& error) {
+    return absl::FailedPreconditionError(absl::StrCat("cannot be processed: ", error.what()));
   }
 }
 

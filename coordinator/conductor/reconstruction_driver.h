@@ -66,6 +66,7 @@ class ReconstructionDriver {
 
  private:
   void Run();
+  absl::Status ConductOrFail();
   absl::Status Conduct();
   absl::Status DeleteEverything();
   absl::Status PrepareScene(const ReconstructionConfig& config);

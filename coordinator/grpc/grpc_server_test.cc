@@ -264,7 +264,8 @@ TEST_F(GrpcServerTest, WhatIsNoBlobIsRefusedAndLeavesNothing) {
   EXPECT_EQ(Fetch("../etc/passwd", &chunks).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   // Nothing is left of what was on its way.
   int files = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(folder_ + "/blobs")) files += entry.is_regular_file() ? 1 : 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ + "/blobs"))
+    files += entry.is_regular_file() ? 1 : 0;
   EXPECT_EQ(files, 0);
 }
 

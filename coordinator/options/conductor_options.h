@@ -21,6 +21,9 @@ struct ConductorOptions {
   // dense set hundreds of cameras overlap each other and nearly all surface is in a few. V_r has no such limit:
   // accepted surfaces hardly overlap, so that all of them together are no larger than what the camera sees.
   int max_surfaces = 32;
+  // What workers deliver is held against it: surfaces have nodes so many pixels apart, or further where a job was made
+  // smaller. >= 1.
+  int lattice_step = 1;
 
   absl::Status Validate() const;
 };

@@ -14,6 +14,7 @@ absl::StatusOr<ReconstructionConfig> ParseConfig(const std::string& options_json
                                  .max_image_size = options.max_image_size,
                                  .conductor = options.conductor,
                                  .join = options.join};
+  config.conductor.lattice_step = options.job.lattice_step;
   config.job_bytes = [job = options.job](const CameraJobSpec& spec, const std::vector<Camera>& cameras) {
     const CameraJobOptions reduced = Reduced(job, spec.reduction);
     return EstimateInputBytes(spec, cameras, reduced.lattice_step) +

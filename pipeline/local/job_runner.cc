@@ -1,7 +1,9 @@
 #include "pipeline/local/job_runner.h"
 
 #include <chrono>
+#include <exception>
 #include <limits>
+#include <new>
 #include <thread>
 #include <utility>
 
@@ -61,9 +63,18 @@ JobRunner::Turn JobRunner::WaitForTurn(QueuedJob& next) {
   return Turn::kJob;
 }
 
+absl::StatusOr<FinishedJob> JobRunner::RunOrFail(const CameraJobSpec& spec) {
+  try {
+    return RunJob(parts_.scene, spec, parts_.inputs, parts_.job, parts_.blobs, parts_.pool);
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError(absl::StrCat("camera ", spec.camera, ": not enough memory"));
+  } catch (const std::exception& error) {
+    return absl::InternalError(absl::StrCat("camera ", spec.camera, ": ", error.what()));
+  }
+}
+
 void JobRunner::Process(const QueuedJob& job, const std::function<void(const CameraJobReport&)>& finished) {
-  absl::StatusOr<FinishedJob> done =
-      RunJob(parts_.scene, job.spec, parts_.inputs, parts_.job, parts_.blobs, parts_.pool);
+  absl::StatusOr<FinishedJob> done = RunOrFail(job.spec);
   const std::string lost = LostBlobOf(done.status());
   {
     const MutexLock lock(mutex_);

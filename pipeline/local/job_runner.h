@@ -62,6 +62,7 @@ class JobRunner {
   void Work(const std::function<void(const CameraJobReport&)>& finished);
   // Waits until there is a job (`next`), or something to look for in the store as nobody else is busy, or an end.
   Turn WaitForTurn(QueuedJob& next);
+  absl::StatusOr<FinishedJob> RunOrFail(const CameraJobSpec& spec);
   void Process(const QueuedJob& job, const std::function<void(const CameraJobReport&)>& finished);
   // One step of the outer loop, and a pass over the jobs that it may have written.
   void Step();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <new>
 #include <random>
 #include <utility>
@@ -207,6 +208,8 @@ v1::HeldJob Agent::Process(const v1::CameraJob& job) {
   } catch (const std::bad_alloc&) {
     told.mutable_failed()->set_reason("out of memory");
     told.mutable_failed()->set_out_of_memory(true);
+  } catch (const std::exception& error) {
+    told.mutable_failed()->set_reason(absl::StrCat("cannot be processed: ", error.what()));
   }
   return told;
 }
