@@ -149,6 +149,8 @@ absl::Status ReconstructionService::OverseeOnce() {
 }
 
 absl::Status ReconstructionService::TakeUp(const ConductedState& state, absl::Time now) {
+  const bool is_of_ours = state.method_version == options_.method_version;
+  if (!is_of_ours && state.state != ReconstructionState::kDeleting) return absl::OkStatus();
   HeldConductorLease* held = nullptr;  // touched by this thread alone, as is what owns it
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -207,6 +209,11 @@ v1::Reconstruction ReconstructionService::Describe(const Reconstruction& stored)
   v1::Reconstruction reconstruction = ToProto(stored);
   if (IsFinal(stored.state)) return reconstruction;
   reconstruction.mutable_progress()->set_jobs_leased(workers_.LeasesIn(stored.id));
+  if (stored.method_version != options_.method_version) {
+    reconstruction.add_warnings(absl::StrCat("it was begun with version ", stored.method_version,
+                                             " of the method, this coordinator has version ", options_.method_version,
+                                             ": it waits for a coordinator of the program that began it"));
+  }
   for (std::string& warning : workers_.WarningsFor(stored.id)) {
     reconstruction.add_warnings(std::move(warning));
   }
@@ -230,7 +237,8 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Create(const v1::Creat
                                  .state = ReconstructionState::kCreated,
                                  .weight = std::round(weight / kMinWeight) * kMinWeight,
                                  .scene_reference = request.scene_reference(),
-                                 .owner = owner};
+                                 .owner = owner,
+                                 .method_version = options_.method_version};
   absl::StatusOr<Reconstruction> stored = Find(wanted.id);
   if (absl::IsNotFound(stored.status())) {
     MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
@@ -244,7 +252,10 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Create(const v1::Creat
         absl::StrCat("id \"", wanted.id, "\" is that of a reconstruction that was deleted"));
   }
   MW_RETURN_IF_ERROR(stored.status());
-  if (stored->owner != wanted.owner || stored->options_json != wanted.options_json ||
+  // What an earlier program wrote may say the same in other words.
+  const absl::StatusOr<ReconstructionConfig> begun = environment_.parse_config(stored->options_json);
+  const std::string& options = begun.ok() ? begun->options_json : stored->options_json;
+  if (stored->owner != wanted.owner || options != wanted.options_json ||
       stored->scene_reference != wanted.scene_reference || std::abs(stored->weight - wanted.weight) > kMinWeight / 2) {
     return absl::AlreadyExistsError(absl::StrCat("id \"", wanted.id, "\" is that of another reconstruction"));
   }

@@ -15,6 +15,7 @@
 
 #include "meshwright/v1/reconstruction.pb.h"
 
+#include "common/base/method_version.h"
 #include "coordinator/api/reconstruction_record.h"
 #include "coordinator/api/scene_upload.h"
 #include "coordinator/conductor/reconstruction_driver.h"
@@ -30,6 +31,8 @@ struct ReconstructionServiceOptions {
   std::string name = "coordinator";
   // Another coordinator takes over what this one conducts when it has been silent so long.
   absl::Duration conductor_lease = absl::Seconds(5);
+  // What was begun with another version of the method is left to coordinators that have it.
+  int64_t method_version = kMethodVersion;
   // Told of each reconstruction that has come to its end here, once; not of one whose end this process did not live to
   // see. Must not block.
   std::function<void(const v1::Reconstruction&)> ended = [](const v1::Reconstruction&) {};

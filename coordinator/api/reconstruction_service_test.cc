@@ -83,7 +83,7 @@ class ReconstructionServiceTest : public testing::Test {
   }
 
   // As a coordinator that is started anew.
-  void Open() {
+  void Open(int64_t method_version = kMethodVersion) {
     service_.reset();
     workers_.reset();
     store_.reset();
@@ -91,15 +91,16 @@ class ReconstructionServiceTest : public testing::Test {
     const RetryOptions retry = {.backoff = absl::Milliseconds(1)};
     workers_ = std::make_unique<WorkerService>(
         LeaseOptions{.lease = absl::Seconds(30), .job_time_limit = absl::Hours(1)}, retry, *store_);
-    auto opened = ReconstructionService::Open({.data_folder = folder_ + "/data", .scene_roots = {folder_ + "/roots"}},
-                                              {.store = store_.get(),
-                                               .blobs = blobs_.get(),
-                                               .clock = &clock_,
-                                               .pool = &pool_,
-                                               .jobs_changed = [this] { workers_->Wake(); },
-                                               .parse_config = ParseTestMethod,
-                                               .max_failures = retry.max_failures},
-                                              *workers_);
+    auto opened = ReconstructionService::Open(
+        {.data_folder = folder_ + "/data", .scene_roots = {folder_ + "/roots"}, .method_version = method_version},
+        {.store = store_.get(),
+         .blobs = blobs_.get(),
+         .clock = &clock_,
+         .pool = &pool_,
+         .jobs_changed = [this] { workers_->Wake(); },
+         .parse_config = ParseTestMethod,
+         .max_failures = retry.max_failures},
+        *workers_);
     MW_CHECK(opened.ok());
     service_ = *std::move(opened);
   }
@@ -138,6 +139,7 @@ class ReconstructionServiceTest : public testing::Test {
     request.set_instance("1");
     request.set_cores(1);
     request.set_memory_bytes(1 << 20);
+    request.set_method_version(kMethodVersion);
     request.set_wait_timeout_seconds(0.05);
     const absl::Time give_up = absl::Now() + absl::Seconds(60);
     while (jobs > 0 && absl::Now() < give_up && !AllOver()) {
@@ -279,6 +281,27 @@ TEST_F(ReconstructionServiceTest, AWorkerWhoseWordIsWorthNothingHarmsNobody) {
       ++lies;
     }
   });
+  const v1::Reconstruction done = WaitFor("wall");
+  EXPECT_EQ(done.state(), v1::RECONSTRUCTION_STATE_DONE) << done.failure();
+  EXPECT_EQ(done.progress().cameras_skipped(), 0);
+}
+
+// An upgrade in the middle, and back: what was begun waits with a warning, and is not touched.
+TEST_F(ReconstructionServiceTest, WhatWasBegunWithAnotherMethodWaitsForACoordinatorThatHasIt) {
+  CreateAndStart("wall");
+  RunWorker("w", 2, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
+  const size_t committed = store_->ListCommits("wall")->size();
+  Open(kMethodVersion + 1);
+  const ConductorLease before = *store_->GetConductorLease("wall");
+  absl::SleepFor(absl::Seconds(2));
+  EXPECT_EQ(store_->GetConductorLease("wall")->epoch, before.epoch);
+  EXPECT_EQ(store_->ListCommits("wall")->size(), committed);
+  const v1::Reconstruction waiting = *service_->Get("wall");
+  EXPECT_FALSE(IsOver(waiting.state())) << waiting.failure();
+  ASSERT_GE(waiting.warnings_size(), 1);
+  EXPECT_THAT(waiting.warnings(0), HasSubstr("begun with version 1 of the method"));
+  Open();
+  RunWorker("w", 1000, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
   const v1::Reconstruction done = WaitFor("wall");
   EXPECT_EQ(done.state(), v1::RECONSTRUCTION_STATE_DONE) << done.failure();
   EXPECT_EQ(done.progress().cameras_skipped(), 0);

@@ -37,6 +37,7 @@ JobKey FromProto(const v1::JobKey& key) { return {key.reconstruction_id(), key.s
 WorkerReport FromProto(const v1::SynchronizeRequest& request) {
   WorkerReport report = {.worker = request.worker_id(),
                          .instance = request.instance(),
+                         .method_version = request.method_version(),
                          .cores = request.cores(),
                          .memory_bytes = request.memory_bytes(),
                          .draining = request.draining(),

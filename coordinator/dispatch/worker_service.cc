@@ -6,6 +6,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
 
 #include "common/base/status_macros.h"
 #include "coordinator/dispatch/proto_times.h"
@@ -78,6 +79,16 @@ absl::Status Validate(const v1::SynchronizeRequest& request) {
 }
 
 double Gibibytes(int64_t bytes) { return static_cast<double>(bytes) / static_cast<double>(int64_t{1} << 30); }
+
+// `workers`: by the version of their method.
+std::string DescribeNoWorker(int64_t version, const std::map<int64_t, int64_t>& workers) {
+  if (workers.empty()) return "cameras wait, and no worker is connected";
+  std::vector<std::string> others;
+  for (const auto& [other, memory] : workers) others.push_back(other == 0 ? "none told" : absl::StrCat(other));
+  return absl::StrCat("cameras wait for a worker with version ", version,
+                      " of the method, which this was begun with; connected workers have ",
+                      absl::StrJoin(others, ", "));
+}
 
 v1::Attempt RunningAttempt(const OpenJob& job) {
   v1::Attempt attempt;
@@ -311,10 +322,11 @@ std::vector<WorkerRecord> WorkerService::Heartbeats(const std::list<Call>& calls
                                 .drained = before.drained && before.instance == request.instance(),
                                 .instance = request.instance(),
                                 .version = request.version(),
-                                .draining = request.draining()};
+                                .draining = request.draining(),
+                                .method_version = request.method_version()};
     const bool is_same = before.cores == heard.cores && before.memory_bytes == heard.memory_bytes &&
                          before.instance == heard.instance && before.version == heard.version &&
-                         before.draining == heard.draining;
+                         before.draining == heard.draining && before.method_version == heard.method_version;
     if (!is_same || now - before.last_heartbeat > lease_.lease / 4) heartbeats.push_back(heard);
   }
   return heartbeats;
@@ -410,22 +422,25 @@ int WorkerService::LeasesIn(const std::string& reconstruction) const {
 
 std::vector<std::string> WorkerService::WarningsFor(const std::string& reconstruction) const {
   const MutexLock lock(mutex_);
-  int64_t largest_worker = 0;
+  std::map<int64_t, int64_t> largest;  // method version -> memory of the largest worker that takes jobs
   for (const auto& [id, worker] : workers_) {
     const bool is_alive = seen_at_ - worker.last_heartbeat <= lease_.lease && !worker.draining && !worker.drained;
-    if (is_alive) largest_worker = std::max(largest_worker, worker.memory_bytes);
+    if (is_alive) largest[worker.method_version] = std::max(largest[worker.method_version], worker.memory_bytes);
   }
   std::vector<std::string> warnings;
-  bool waits = false;
+  std::set<int64_t> without_worker;
   for (const OpenJob& job : seen_) {
     if (job.reconstruction_id != reconstruction || !job.lease_worker.empty()) continue;
-    waits = true;
-    if (largest_worker == 0 || job.memory_bytes <= largest_worker) continue;
-    warnings.push_back(
-        absl::StrFormat("camera %d needs %.1f GiB of memory, the largest worker has %.1f GiB: start a worker with more",
-                        job.camera, Gibibytes(job.memory_bytes), Gibibytes(largest_worker)));
+    const auto fitting = largest.find(job.method_version);
+    if (fitting == largest.end()) {
+      without_worker.insert(job.method_version);
+    } else if (job.memory_bytes > fitting->second) {
+      warnings.push_back(absl::StrFormat(
+          "camera %d needs %.1f GiB of memory, the largest worker has %.1f GiB: start a worker with more", job.camera,
+          Gibibytes(job.memory_bytes), Gibibytes(fitting->second)));
+    }
   }
-  if (waits && largest_worker == 0) warnings.emplace_back("cameras wait, and no worker is connected");
+  for (const int64_t version : without_worker) warnings.push_back(DescribeNoWorker(version, largest));
   return warnings;
 }
 
@@ -454,6 +469,7 @@ v1::ListWorkersResponse WorkerService::ListWorkers() const {
     worker.set_memory_bytes(record.memory_bytes);
     worker.set_draining(record.draining || record.drained);
     worker.set_version(record.version);
+    worker.set_method_version(static_cast<int32_t>(record.method_version));
     FillTime(record.last_heartbeat, *worker.mutable_last_seen());
     by_id[record.id] = &worker;
   }

@@ -25,6 +25,7 @@ v1::SynchronizeRequest Request(const std::string& worker) {
   request.set_instance("1");
   request.set_cores(1);
   request.set_memory_bytes(1000);
+  request.set_method_version(kMethodVersion);
   return request;
 }
 
@@ -123,6 +124,26 @@ class WorkerServiceTest : public testing::Test {
   std::unique_ptr<WorkerService> service_;
   std::unique_ptr<WorkerService> other_;
 };
+
+// A rolling upgrade and back: workers of both versions are connected, and each does what was begun with its own.
+TEST_F(WorkerServiceTest, WorkersOfOtherMethodsGetNothingAndCostNoCamera) {
+  Offer(1);
+  v1::SynchronizeRequest next = Request("next");
+  next.set_method_version(kMethodVersion + 1);
+  v1::SynchronizeRequest silent = Request("silent");
+  silent.clear_method_version();
+  for (int call = 0; call < 20; ++call) {
+    EXPECT_EQ(Synchronize(next).jobs_size(), 0);
+    EXPECT_EQ(Synchronize(silent).jobs_size(), 0);
+  }
+  ASSERT_EQ(service_->WarningsFor("a").size(), 1);
+  EXPECT_THAT(service_->WarningsFor("a")[0], HasSubstr("version 1 of the method"));
+  EXPECT_THAT(service_->WarningsFor("a")[0], HasSubstr("none told, 2"));
+  EXPECT_EQ(Stored(1).failed_attempts, 0);
+  EXPECT_EQ(Stored(1).losses, 0);
+  EXPECT_EQ(Synchronize(Request("w")).jobs_size(), 1);
+  EXPECT_TRUE(service_->WarningsFor("a").empty());
+}
 
 TEST_F(WorkerServiceTest, AJobIsToldAgainUntilItsResultIsThere) {
   Offer(1);

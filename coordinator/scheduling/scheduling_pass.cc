@@ -191,8 +191,8 @@ void SchedulingPass::Expire(bool silence_counts) {
   }
 }
 
-bool SchedulingPass::Fits(const OpenJob& job, int64_t free_bytes) const {
-  return job.not_before <= now_ && job.memory_bytes <= free_bytes;
+bool SchedulingPass::Fits(const OpenJob& job, const WorkerReport& report, int64_t free_bytes) const {
+  return job.method_version == report.method_version && job.not_before <= now_ && job.memory_bytes <= free_bytes;
 }
 
 void SchedulingPass::Grant(const WorkerReport& report) {
@@ -205,8 +205,9 @@ void SchedulingPass::Grant(const WorkerReport& report) {
     size_t best_job = 0;
     for (auto& [id, share] : shares_) {
       if (best != nullptr && share.leases / share.weight >= best->leases / best->weight) continue;
-      const auto fitting = std::find_if(share.waiting.begin(), share.waiting.end(),
-                                        [&](size_t job) { return !changed_[job] && Fits(jobs_[job], free_bytes); });
+      const auto fitting = std::find_if(share.waiting.begin(), share.waiting.end(), [&](size_t job) {
+        return !changed_[job] && Fits(jobs_[job], report, free_bytes);
+      });
       if (fitting == share.waiting.end()) continue;
       best = &share;
       best_job = *fitting;

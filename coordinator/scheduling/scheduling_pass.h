@@ -48,8 +48,8 @@ class SchedulingPass {
   bool ApplyReport(const WorkerReport& report);
   // Ends leases that ran out, or of jobs that take too long.
   void Expire(bool silence_counts);
-  // Gives the worker what it can take: of the reconstruction with the fewest leases for its weight first, of one
-  // reconstruction by sequence.
+  // Gives the worker what it can take and has the method for: of the reconstruction with the fewest leases for its
+  // weight first, of one reconstruction by sequence.
   void Grant(const WorkerReport& report);
 
   struct Change {
@@ -75,7 +75,7 @@ class SchedulingPass {
   void ApplyFailed(size_t job, const JobFailed& failed);
   void ApplyRunning(size_t job);
   void Add(size_t job, JobChange change);
-  bool Fits(const OpenJob& job, int64_t free_bytes) const;
+  bool Fits(const OpenJob& job, const WorkerReport& report, int64_t free_bytes) const;
 
   const LeaseOptions& lease_;
   const RetryOptions& retry_;

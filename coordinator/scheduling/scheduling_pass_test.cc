@@ -37,7 +37,8 @@ OpenJob Leased(const std::string& id, SequenceNumber sequence, const std::string
 }
 
 WorkerReport Worker(const std::string& id, int cores = 1, int64_t memory_bytes = 1000) {
-  return {.worker = id, .instance = "1", .cores = cores, .memory_bytes = memory_bytes};
+  return {
+      .worker = id, .instance = "1", .method_version = kMethodVersion, .cores = cores, .memory_bytes = memory_bytes};
 }
 
 HeldJob& Hold(WorkerReport& report, const OpenJob& job) { return report.held.emplace_back(HeldJob{KeyOf(job), {}}); }
@@ -64,6 +65,22 @@ TEST(SchedulingPassTest, AWorkerGetsWhatFitsItsCoresAndMemory) {
   EXPECT_THAT(Changes(plan), ElementsAre("claim a1", "claim a3", "claim a4"));
   plan.Grant(Worker("v", 3));
   EXPECT_THAT(Changes(plan), ElementsAre("claim a1", "claim a3", "claim a4", "claim a2"));
+}
+
+TEST(SchedulingPassTest, AWorkerGetsJobsOfItsMethodOnly) {
+  OpenJob of_next = Waiting("a", 1);
+  ++of_next.method_version;
+  SchedulingPass plan = Plan({of_next, Waiting("b", 1)});
+  plan.Grant(Worker("w", 3));
+  EXPECT_THAT(Changes(plan), ElementsAre("claim b1"));
+  WorkerReport silent = Worker("s", 3);
+  silent.method_version = 0;  // it does not say
+  plan.Grant(silent);
+  EXPECT_THAT(Changes(plan), ElementsAre("claim b1"));
+  WorkerReport next = Worker("n", 3);
+  next.method_version = of_next.method_version;
+  plan.Grant(next);
+  EXPECT_THAT(Changes(plan), ElementsAre("claim b1", "claim a1"));
 }
 
 TEST(SchedulingPassTest, WhatItHoldsAlreadyCounts) {

@@ -43,8 +43,9 @@ struct HeldJob {
 // What a worker says of itself and of the jobs that it holds: a process in a cluster, or the threads of this one.
 struct WorkerReport {
   std::string worker;
-  std::string instance;  // of its process
-  int cores = 1;         // it takes as many jobs
+  std::string instance;        // of its process
+  int64_t method_version = 0;  // it does jobs of reconstructions that were begun with the same
+  int cores = 1;               // it takes as many jobs
   int64_t memory_bytes = 0;
   bool draining = false;           // it wants nothing more
   bool ran_out_of_memory = false;  // the process before it did

@@ -11,6 +11,7 @@
 #include <absl/time/time.h>
 
 #include "common/base/ids.h"
+#include "common/base/method_version.h"
 
 namespace meshwright {
 
@@ -51,6 +52,7 @@ struct Reconstruction {
   absl::Time finished_at = absl::InfinitePast();  // in a final state only
   StoredMesh mesh;
   Progress progress;
+  int64_t method_version = kMethodVersion;  // that it was begun with
 };
 
 // The life of a camera job: assigned -> done -> committed, or assigned -> skipped -> committed (with no surface).
@@ -98,7 +100,8 @@ struct OpenJob {
   int64_t failed_attempts = 0;
   int64_t losses = 0;
   int64_t reduction = 0;
-  bool is_repair = false;  // see CameraJob::expected_digest
+  bool is_repair = false;                   // see CameraJob::expected_digest
+  int64_t method_version = kMethodVersion;  // the reconstruction's
   absl::Time not_before;
   std::string lease_worker;  // "" when it waits
   std::string lease_instance;
@@ -185,6 +188,7 @@ struct ConductedState {
   std::string id;
   ReconstructionState state = ReconstructionState::kRunning;
   ConductorLease lease;  // epoch 0: nobody ever conducted it
+  int64_t method_version = kMethodVersion;
 };
 
 struct WorkerRecord {
@@ -195,7 +199,8 @@ struct WorkerRecord {
   bool drained = false;  // its operator wants no more jobs for this process of it; heartbeats do not say it
   std::string instance;  // of its process
   std::string version;
-  bool draining = false;  // it says so itself
+  bool draining = false;       // it says so itself
+  int64_t method_version = 0;  // 0: it does not say
 };
 
 struct SceneFile {

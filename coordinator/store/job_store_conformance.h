@@ -363,7 +363,9 @@ TEST_P(JobStoreConformance, AJobIsLeasedToOneWorkerInANewEpoch) {
 TEST_P(JobStoreConformance, OpenJobsAreThoseOfReconstructionsThatRun) {
   ASSERT_TRUE(
       store()
-          .CreateReconstruction({.id = "abbey", .options_json = "{}", .scene_digest = Digest('1'), .weight = 2.5}, kNow)
+          .CreateReconstruction(
+              {.id = "abbey", .options_json = "{}", .scene_digest = Digest('1'), .weight = 2.5, .method_version = 7},
+              kNow)
           .ok());
   ASSERT_TRUE(Assign("castle", {1, 7, 0, 5'000'000'000}).ok());
   ASSERT_TRUE(Assign("castle", {2, 3, 0}).ok());
@@ -374,6 +376,10 @@ TEST_P(JobStoreConformance, OpenJobsAreThoseOfReconstructionsThatRun) {
   ASSERT_EQ(open->size(), 3);
   EXPECT_EQ(open->at(0).reconstruction_id, "abbey");
   EXPECT_EQ(open->at(0).weight, 2.5);
+  EXPECT_EQ(open->at(0).method_version, 7);
+  EXPECT_EQ(open->at(1).method_version, kMethodVersion);
+  EXPECT_EQ(store().GetReconstruction("abbey")->method_version, 7);
+  EXPECT_EQ(store().ListConducted()->at(0).method_version, 7);
   EXPECT_EQ(open->at(1).camera, 7);
   EXPECT_EQ(open->at(1).memory_bytes, 5'000'000'000);
   EXPECT_EQ(open->at(1).lease_worker, "");
@@ -790,7 +796,8 @@ TEST_P(JobStoreConformance, WorkersAreKnownByTheirHeartbeats) {
          .last_heartbeat = kNow + kLease,
          .instance = "x",
          .version = "7",
-         .draining = true};
+         .draining = true,
+         .method_version = 3};
   ASSERT_TRUE(store().ApplyChanges({}, {ant}, kNow).ok());
   Reopen();
   const auto workers = store().ListWorkers();
@@ -802,6 +809,8 @@ TEST_P(JobStoreConformance, WorkersAreKnownByTheirHeartbeats) {
   EXPECT_EQ(workers->at(0).last_heartbeat, kNow + kLease);
   EXPECT_EQ(workers->at(0).instance, "x");
   EXPECT_EQ(workers->at(0).version, "7");
+  EXPECT_EQ(workers->at(0).method_version, 3);
+  EXPECT_EQ(workers->at(1).method_version, 0);
   EXPECT_TRUE(workers->at(0).drained);
   EXPECT_TRUE(workers->at(0).draining);
   EXPECT_EQ(workers->at(1).memory_bytes, 8'000'000'000);

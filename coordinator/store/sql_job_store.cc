@@ -41,6 +41,7 @@ absl::StatusOr<Reconstruction> ReadReconstruction(const SqlRow& row) {
                              .patches_filtered = row.Integer(18),
                              .patches_accepted = row.Integer(19)};
   reconstruction.owner = row.Text(20);
+  reconstruction.method_version = row.Integer(21);
   return reconstruction;
 }
 
@@ -159,7 +160,8 @@ absl::Status SqlJobStore::CreateReconstruction(const Reconstruction& reconstruct
                   {"reason", PrintableText(reconstruction.state_reason)},
                   {"weight_thousandths", weight},
                   {"scene_reference", reconstruction.scene_reference},
-                  {"owner", reconstruction.owner}}}})
+                  {"owner", reconstruction.owner},
+                  {"method_version", reconstruction.method_version}}}})
       .status();
 }
 

@@ -96,7 +96,8 @@ SqlCall HeartbeatCall(const WorkerRecord& worker) {
            {"now", absl::ToUnixMicros(worker.last_heartbeat)},
            {"instance", worker.instance},
            {"version", worker.version},
-           {"draining", worker.draining ? 1 : 0}}};
+           {"draining", worker.draining ? 1 : 0},
+           {"method_version", worker.method_version}}};
 }
 
 }  // namespace
@@ -116,6 +117,7 @@ absl::StatusOr<std::vector<OpenJob>> SqlJobStore::ListOpenJobs() {
                     .losses = row.Integer(6),
                     .reduction = row.Integer(7),
                     .is_repair = row.Integer(14) != 0,
+                    .method_version = row.Integer(15),
                     .not_before = row.Time(8),
                     .lease_worker = row.Text(9),
                     .lease_instance = row.Text(10),
@@ -229,7 +231,8 @@ absl::StatusOr<std::vector<ConductedState>> SqlJobStore::ListConducted() {
     MW_ASSIGN_OR_RETURN(const ReconstructionState state, ReadReconstructionState(row.Text(1)));
     all.push_back({.id = row.Text(0),
                    .state = state,
-                   .lease = {.owner = row.Text(2), .epoch = row.Integer(3), .expires_at = row.Time(4)}});
+                   .lease = {.owner = row.Text(2), .epoch = row.Integer(3), .expires_at = row.Time(4)},
+                   .method_version = row.Integer(5)});
   }
   return all;
 }
@@ -252,7 +255,8 @@ absl::StatusOr<std::vector<WorkerRecord>> SqlJobStore::ListWorkers() {
                        .drained = row.Integer(4) != 0,
                        .instance = row.Text(5),
                        .version = row.Text(6),
-                       .draining = row.Integer(7) != 0});
+                       .draining = row.Integer(7) != 0,
+                       .method_version = row.Integer(8)});
   }
   return workers;
 }

@@ -112,7 +112,8 @@ void JobRunner::Pass() {
 }
 
 WorkerReport JobRunner::Report() const {
-  WorkerReport report = {.worker = kWorker, .instance = kWorker, .draining = !status_.ok()};
+  WorkerReport report = {
+      .worker = kWorker, .instance = kWorker, .method_version = kMethodVersion, .draining = !status_.ok()};
   for (const auto& [key, held] : held_) report.held.push_back(held);
   // One job may always run.
   report.cores = held_.empty() ? 1 : settings_.concurrent_jobs;

@@ -334,7 +334,7 @@ class LocalReconstruction {
     // world = local + offset
     if (!scene_.offset.isZero(0)) report["scene"]["offset"] = {scene_.offset.x(), scene_.offset.y(), scene_.offset.z()};
     report["options"] = ToJson(options_);
-    report["options"].erase("version");
+    report["options"].erase("method");
     report["totals"] = std::move(cameras["totals"]);
     // Of this process; a resumed reconstruction's earlier processes took theirs.
     report["process"] = {{"threads", settings_.threads},

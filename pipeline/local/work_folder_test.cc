@@ -62,6 +62,14 @@ TEST_F(WorkFolderTest, NamesWhatDiffers) {
   EXPECT_TRUE(Open('a', R"({"window":3,"support":2})").ok()) << "asking changes nothing";
 }
 
+TEST_F(WorkFolderTest, TheMethodsVersionCountsAndTheProgramsDoesNot) {
+  ASSERT_TRUE(Open('a', R"({"version":"0.1.0","window":3})").ok());  // as programs before the method's version wrote
+  EXPECT_TRUE(Open('a', R"({"method":1,"window":3})").ok());
+  const absl::Status next = Open('a', R"({"method":2,"window":3})").status();
+  EXPECT_TRUE(absl::IsFailedPrecondition(next));
+  EXPECT_THAT(std::string(next.message()), HasSubstr("begun with version 1 of the method, this program has version 2"));
+}
+
 TEST_F(WorkFolderTest, RestartThrowsAwayWhatItHolds) {
   std::string digest;
   {

@@ -7,6 +7,7 @@
 
 #include "pipeline/options/option_table.h"
 
+#include "common/base/method_version.h"
 #include "common/base/status_macros.h"
 #include "common/json/json_text.h"
 #include "common/json/parse_json.h"
@@ -14,7 +15,16 @@
 namespace meshwright {
 namespace {
 
-constexpr char kVersion[] = "version";
+constexpr char kMethod[] = "method";
+// What the programs before wrote instead of the method's version: their own, which was always this.
+constexpr char kProgram[] = "version";
+constexpr char kProgramOfFirstMethod[] = "0.1.0";
+
+int64_t MethodOf(const nlohmann::ordered_json& json) {
+  const auto method = json.find(kMethod);
+  if (method == json.end()) return 1;
+  return method->is_number_integer() ? method->get<int64_t>() : 0;
+}
 
 absl::Status Wrong(const std::string& message) {
   return absl::InvalidArgumentError(absl::StrCat("options_json: ", message));
@@ -56,12 +66,18 @@ absl::StatusOr<ReconstructionOptions> ParseOptions(const std::string& options_js
   if (!json->is_object()) return Wrong("a JSON object expected");
   ReconstructionOptions options;
   for (const auto& [name, value] : json->items()) {
-    if (name == kVersion) continue;
+    if (name == kMethod || name == kProgram) continue;
     if (const absl::Status set = SetOption(name, value, options); !set.ok()) return Wrong(std::string(set.message()));
   }
-  const auto version = json->find(kVersion);
-  if (version != json->end() && *version != MW_VERSION) {
-    return Wrong(absl::StrCat("version is ", JsonText(*version).substr(0, 40), ", this is ", MW_VERSION));
+  const auto program = json->find(kProgram);
+  if (program != json->end() && *program != kProgramOfFirstMethod) {
+    return Wrong(absl::StrCat("version is ", JsonText(*program).substr(0, 40), ", expected none"));
+  }
+  const auto method = json->find(kMethod);
+  const bool is_first = program != json->end() && kMethodVersion != 1;
+  if (is_first || (method != json->end() && *method != kMethodVersion)) {
+    return Wrong(absl::StrCat("method is ", method == json->end() ? "1" : JsonText(*method).substr(0, 40),
+                              ", this program has version ", kMethodVersion, " of the method"));
   }
   if (const absl::Status checked = CheckOptions(options, ""); !checked.ok()) {
     return Wrong(std::string(checked.message()));
@@ -71,14 +87,19 @@ absl::StatusOr<ReconstructionOptions> ParseOptions(const std::string& options_js
 
 nlohmann::ordered_json ToJson(const ReconstructionOptions& options) {
   nlohmann::ordered_json json;
-  json[kVersion] = MW_VERSION;
+  json[kMethod] = kMethodVersion;
   for (const Option& option : OptionTable()) json[option.name] = ToJson(option.Get(options));
   return json;
 }
 
 std::vector<std::string> DescribeDifferences(const nlohmann::ordered_json& before, const nlohmann::ordered_json& now) {
   std::vector<std::string> differences;
+  if (MethodOf(before) != MethodOf(now)) {
+    differences.push_back(absl::StrCat("it was begun with version ", MethodOf(before),
+                                       " of the method, this program has version ", MethodOf(now)));
+  }
   for (const auto& [name, value] : now.items()) {
+    if (name == kMethod) continue;
     const auto stored = before.find(name);
     if (stored != before.end() && *stored == value) continue;
     differences.push_back(absl::StrCat("--", name, " was ", stored == before.end() ? "not known" : JsonText(*stored),

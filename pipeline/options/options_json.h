@@ -14,7 +14,7 @@ namespace meshwright {
 // InvalidArgument begins with "options_json: ", then names the option, its value and the values allowed.
 absl::StatusOr<ReconstructionOptions> ParseOptions(const std::string& options_json);
 
-// {"version": ..., "max-image-size": 0, ...}: every option and the program's version. ParseOptions takes it.
+// {"method": 1, "max-image-size": 0, ...}: every option and the method's version. ParseOptions takes it.
 nlohmann::ordered_json ToJson(const ReconstructionOptions& options);
 
 // "--window was 3, now 1", one for each difference between two results of ToJson.

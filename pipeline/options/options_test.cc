@@ -111,7 +111,9 @@ TEST(ParseOptionsTest, WhatIsNotSaidHasItsDefault) {
   EXPECT_EQ(ToJson(*ParseOptions("")), defaults);
   EXPECT_EQ(ToJson(*ParseOptions("{}")), defaults);
   EXPECT_EQ(ToJson(*ParseOptions(defaults.dump())), defaults);
-  EXPECT_EQ(defaults.size(), OptionTable().size() + 1);  // and the version
+  EXPECT_EQ(defaults.size(), OptionTable().size() + 1);  // and the method
+  EXPECT_EQ(ToJson(*ParseOptions(R"({"version": "0.1.0"})")),
+            defaults);  // as programs before the method's version wrote
   EXPECT_EQ(ParseOptions(R"({"window": 7})")->conductor.window, 7);
   EXPECT_EQ(ParseOptions(R"({"max-hole": 7})")->join.max_hole_steps, 7);
 }
@@ -126,6 +128,9 @@ TEST(ParseOptionsTest, TextsThatAreNoOptionsAreRefused) {
   EXPECT_THAT(Refusal("[]"), HasSubstr("a JSON object expected"));
   EXPECT_THAT(Refusal("{"), HasSubstr("the text is not valid JSON"));
   EXPECT_THAT(Refusal(R"({"version": "7"})"), HasSubstr("version is \"7\""));
+  for (const char* const method : {"7", "0", "\"1\"", "1.5", "[]"}) {
+    EXPECT_THAT(Refusal(absl::StrCat("{\"method\": ", method, "}")), HasSubstr(absl::StrCat("method is ", method)));
+  }
   EXPECT_THAT(Refusal(R"({"window": 99999999999999999999})"), HasSubstr("expected a whole number from 1 to"));
 }
 

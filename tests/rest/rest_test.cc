@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 
+#include "common/base/method_version.h"
 #include "common/mesh/ply.h"
 #include "tests/rest/rest_cluster.h"
 #include "worker/agent/grpc_coordinator.h"
@@ -288,6 +289,7 @@ TEST_F(RestTest, TheLogSaysWhatFailedAndWhy) {
   request.set_instance("1");
   request.set_cores(1);
   request.set_memory_bytes(int64_t{1} << 40);
+  request.set_method_version(kMethodVersion);
   request.set_wait_timeout_seconds(1);
   const auto first = channel->Synchronize(request);
   ASSERT_TRUE(first.ok()) << first.status();

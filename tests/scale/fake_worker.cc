@@ -5,6 +5,7 @@
 #include <absl/time/clock.h>
 
 #include "common/base/check.h"
+#include "common/base/method_version.h"
 #include "common/surface/codec.h"
 #include "tests/scale/wall_world.h"
 
@@ -18,6 +19,7 @@ FakeWorkerFigures FakeWorker::Run() {
   request.set_instance(id_);
   request.set_cores(1);
   request.set_memory_bytes(int64_t{1} << 30);
+  request.set_method_version(kMethodVersion);
   while (!stopping_) {
     const bool brings_result = request.held_size() > 0;
     request.set_wait_timeout_seconds(brings_result ? 0 : 5);

@@ -100,6 +100,7 @@ v1::SynchronizeRequest Agent::NextRequest() {
   request.set_worker_id(options_.worker_id);
   request.set_instance(instance_);
   request.set_version(options_.version);
+  request.set_method_version(static_cast<int32_t>(options_.method_version));
   request.set_memory_bytes(options_.memory_bytes);
   request.set_ran_out_of_memory(options_.ran_out_of_memory);
   const MutexLock lock(mutex_);

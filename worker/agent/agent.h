@@ -12,6 +12,7 @@
 
 #include "meshwright/v1/worker.pb.h"
 
+#include "common/base/method_version.h"
 #include "common/base/mutex.h"
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
@@ -24,7 +25,8 @@ namespace meshwright {
 
 struct AgentOptions {
   std::string worker_id;
-  std::string version;
+  std::string version;  // of the program
+  int64_t method_version = kMethodVersion;
   int cores = 1;                             // jobs at the same time, and cores of all of them together
   int64_t memory_bytes = 1 << 30;            // what jobs may take together
   absl::Duration drain = absl::Seconds(30);  // after Drain(), jobs may take so long before they are released

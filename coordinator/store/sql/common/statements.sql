@@ -10,25 +10,26 @@ INSERT INTO reconstruction_ids (id) VALUES (:id);
 
 -- name: create_reconstruction
 INSERT INTO reconstructions (id, options_json, scene_digest, state, created_at, state_reason, weight_thousandths,
-                             scene_reference, owner)
-VALUES (:id, :options_json, :scene_digest, :state, :now, :reason, :weight_thousandths, :scene_reference, :owner);
+                             scene_reference, owner, method_version)
+VALUES (:id, :options_json, :scene_digest, :state, :now, :reason, :weight_thousandths, :scene_reference, :owner,
+        :method_version);
 
 -- name: get_reconstruction
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
-       cameras_in_flight, patches_filtered, patches_accepted, owner
+       cameras_in_flight, patches_filtered, patches_accepted, owner, method_version
 FROM reconstructions WHERE id = :id;
 
 -- name: list_reconstructions
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
-       cameras_in_flight, patches_filtered, patches_accepted, owner
+       cameras_in_flight, patches_filtered, patches_accepted, owner, method_version
 FROM reconstructions WHERE id > :after AND state <> 'deleting' ORDER BY id LIMIT :limit;
 
 -- name: list_reconstructions_of
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
-       cameras_in_flight, patches_filtered, patches_accepted, owner
+       cameras_in_flight, patches_filtered, patches_accepted, owner, method_version
 FROM reconstructions WHERE owner = :owner AND id > :after AND state <> 'deleting' ORDER BY id LIMIT :limit;
 
 -- name: usage_of
@@ -131,7 +132,7 @@ FROM camera_jobs WHERE reconstruction_id = :id AND sequence > :after AND state <
 -- name: list_open_jobs
 SELECT j.reconstruction_id, j.sequence, j.camera, j.epoch, j.memory_bytes, j.failed_attempts, j.losses, j.reduction,
        j.not_before, j.lease_worker, j.lease_instance, j.leased_at, j.lease_expires_at, r.weight_thousandths,
-       CASE WHEN j.expected_digest IS NULL THEN 0 ELSE 1 END
+       CASE WHEN j.expected_digest IS NULL THEN 0 ELSE 1 END, r.method_version
 FROM camera_jobs AS j JOIN reconstructions AS r ON r.id = j.reconstruction_id
 WHERE j.state = 'assigned' AND r.state IN ('running', 'joining')
 ORDER BY j.reconstruction_id, j.sequence;
@@ -219,24 +220,26 @@ UPDATE conductor_leases SET expires_at = :now WHERE reconstruction_id = :id AND 
 SELECT owner, epoch, expires_at FROM conductor_leases WHERE reconstruction_id = :id;
 
 -- name: list_conducted
-SELECT r.id, r.state, c.owner, c.epoch, c.expires_at
+SELECT r.id, r.state, c.owner, c.epoch, c.expires_at, r.method_version
 FROM reconstructions AS r LEFT JOIN conductor_leases AS c ON c.reconstruction_id = r.id
 WHERE r.state IN ('preparing', 'running', 'joining', 'deleting')
 ORDER BY r.id;
 
 -- name: record_heartbeat
-INSERT INTO workers (id, cores, memory_bytes, last_heartbeat, instance, version, draining)
-VALUES (:worker, :cores, :memory_bytes, :now, :instance, :version, :draining)
+INSERT INTO workers (id, cores, memory_bytes, last_heartbeat, instance, version, draining, method_version)
+VALUES (:worker, :cores, :memory_bytes, :now, :instance, :version, :draining, :method_version)
 ON CONFLICT (id) DO UPDATE
 SET cores = excluded.cores, memory_bytes = excluded.memory_bytes, last_heartbeat = excluded.last_heartbeat,
     drained = CASE WHEN workers.instance = excluded.instance THEN workers.drained ELSE 0 END,
-    instance = excluded.instance, version = excluded.version, draining = excluded.draining;
+    instance = excluded.instance, version = excluded.version, draining = excluded.draining,
+    method_version = excluded.method_version;
 
 -- name: set_worker_drained
 UPDATE workers SET drained = :drained WHERE id = :worker;
 
 -- name: list_workers
-SELECT id, cores, memory_bytes, last_heartbeat, drained, instance, version, draining FROM workers ORDER BY id;
+SELECT id, cores, memory_bytes, last_heartbeat, drained, instance, version, draining, method_version
+FROM workers ORDER BY id;
 
 -- name: remove_silent_workers
 DELETE FROM workers WHERE last_heartbeat < :before
