@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+
 #include <absl/time/clock.h>
 #include <absl/time/time.h>
 
@@ -16,6 +18,19 @@ class RealClock : public Clock {
  public:
   absl::Time Now() const override { return absl::Now(); }
 };
+
+// Goes on evenly, whatever is done to the time of day, from some moment that only this process knows: for how long
+// something takes or is waited for. Stands still while the machine sleeps.
+inline absl::Time MonotonicNow() {
+  return absl::UnixEpoch() + absl::FromChrono(std::chrono::steady_clock::now().time_since_epoch());
+}
+
+class MonotonicClock : public Clock {
+ public:
+  absl::Time Now() const override { return MonotonicNow(); }
+};
+
+inline const MonotonicClock kMonotonicClock{};
 
 // A clock that stands still until it is told to advance. For tests; not thread-safe.
 class ManualClock : public Clock {

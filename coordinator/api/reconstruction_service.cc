@@ -144,6 +144,9 @@ absl::Status ReconstructionService::OverseeOnce() {
   }
   ended.clear();
   for (const std::string& id : ended_ids) TellEnd(id);
+  for (auto it = others_.begin(); it != others_.end();) {
+    it = by_id.count(it->first) > 0 ? std::next(it) : others_.erase(it);
+  }
   for (const ConductedState& state : all) MW_RETURN_IF_ERROR(TakeUp(state, now));
   return absl::OkStatus();
 }
@@ -166,11 +169,13 @@ absl::Status ReconstructionService::TakeUp(const ConductedState& state, absl::Ti
     const absl::Status renewed = held->RenewIfDue(now);
     return absl::IsAborted(renewed) ? absl::OkStatus() : renewed;
   }
+  absl::Time lapsed_by = now;
   if (state.lease.epoch > 0 && state.lease.expires_at > now && state.lease.owner != options_.name) {
-    return absl::OkStatus();
+    if (!IsAbandoned(state)) return absl::OkStatus();
+    lapsed_by = state.lease.expires_at;
   }
-  absl::StatusOr<HeldConductorLease> lease =
-      HeldConductorLease::Acquire(*environment_.store, state.id, options_.name, options_.conductor_lease, now);
+  absl::StatusOr<HeldConductorLease> lease = HeldConductorLease::Acquire(*environment_.store, state.id, options_.name,
+                                                                         options_.conductor_lease, now, lapsed_by);
   // Another coordinator was quicker, or it is gone.
   if (absl::IsFailedPrecondition(lease.status()) || absl::IsNotFound(lease.status())) return absl::OkStatus();
   MW_RETURN_IF_ERROR(lease.status());
@@ -179,6 +184,15 @@ absl::Status ReconstructionService::TakeUp(const ConductedState& state, absl::Ti
                                                                 state.state == ReconstructionState::kDeleting,
                                                                 [this](bool has_ended) { Changed(has_ended); });
   return absl::OkStatus();
+}
+
+bool ReconstructionService::IsAbandoned(const ConductedState& state) {
+  const absl::Time now = MonotonicNow();
+  SeenLease& seen = others_[state.id];
+  if (seen.epoch != state.lease.epoch || seen.expires_at != state.lease.expires_at) {
+    seen = {.epoch = state.lease.epoch, .expires_at = state.lease.expires_at, .since = now};
+  }
+  return now - seen.since > options_.conductor_lease;
 }
 
 void ReconstructionService::StopConducting(const std::string& id) {

@@ -106,6 +106,8 @@ class ReconstructionService {
   void Oversee();
   absl::Status OverseeOnce();
   absl::Status TakeUp(const ConductedState& state, absl::Time now);
+  // Somebody else's lease has not been renewed for its length, by the monotonic clock.
+  bool IsAbandoned(const ConductedState& state);
 
   const ReconstructionServiceOptions options_;
   const CoordinatorFolders folders_;
@@ -119,6 +121,13 @@ class ReconstructionService {
   bool look_ = false;                                                       // the overseer should look now
   bool stopping_ = false;
   std::condition_variable overseer_wake_;
+  // Of the overseer alone: leases as they stood, and since when.
+  struct SeenLease {
+    int64_t epoch = 0;
+    absl::Time expires_at;
+    absl::Time since;  // monotonic
+  };
+  std::map<std::string, SeenLease> others_;
   std::thread overseer_;
 };
 

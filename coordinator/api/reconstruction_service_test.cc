@@ -307,6 +307,19 @@ TEST_F(ReconstructionServiceTest, WhatWasBegunWithAnotherMethodWaitsForACoordina
   EXPECT_EQ(done.progress().cameras_skipped(), 0);
 }
 
+// The store's clock was set back an hour, and the coordinator that held the lease is gone.
+TEST_F(ReconstructionServiceTest, AnotherTakesOverWhateverTheClockSays) {
+  v1::CreateReconstructionRequest request;
+  request.set_id("wall");
+  request.set_scene_reference("file:wall");
+  ASSERT_TRUE(service_->Create(request).ok());
+  const absl::Time now = absl::Now();
+  ASSERT_TRUE(store_->AcquireConductorLease("wall", "another", now + absl::Hours(1), now).ok());
+  ASSERT_TRUE(service_->Start("wall").ok());
+  RunWorker("w", 1000, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
+  EXPECT_EQ(WaitFor("wall").state(), v1::RECONSTRUCTION_STATE_DONE);
+}
+
 TEST_F(ReconstructionServiceTest, ACoordinatorThatIsStartedAnewGoesOn) {
   CreateAndStart("whole");
   RunWorker("w", 1000, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });

@@ -16,8 +16,9 @@ HeldConductorLease::HeldConductorLease(JobStore& store, std::string reconstructi
 
 absl::StatusOr<HeldConductorLease> HeldConductorLease::Acquire(JobStore& store, const std::string& reconstruction,
                                                                const std::string& owner, absl::Duration duration,
-                                                               absl::Time now) {
-  MW_ASSIGN_OR_RETURN(const int64_t epoch, store.AcquireConductorLease(reconstruction, owner, now + duration, now));
+                                                               absl::Time now, absl::Time lapsed_by) {
+  MW_ASSIGN_OR_RETURN(const int64_t epoch,
+                      store.AcquireConductorLease(reconstruction, owner, now + duration, lapsed_by));
   return HeldConductorLease(store, reconstruction, epoch, duration, now);
 }
 

@@ -15,10 +15,11 @@ namespace meshwright {
 // whoever has lost it, and does not know yet, changes nothing any more. Not thread-safe.
 class HeldConductorLease {
  public:
-  // FailedPrecondition while somebody else holds it; `owner` takes back what it held itself, in a new epoch. `store`
-  // outlives the lease.
+  // FailedPrecondition while somebody else holds it: one that lasts beyond `lapsed_by`. `owner` takes back what it held
+  // itself, in a new epoch. `store` outlives the lease.
   static absl::StatusOr<HeldConductorLease> Acquire(JobStore& store, const std::string& reconstruction,
-                                                    const std::string& owner, absl::Duration duration, absl::Time now);
+                                                    const std::string& owner, absl::Duration duration, absl::Time now,
+                                                    absl::Time lapsed_by);
 
   int64_t epoch() const { return epoch_; }
   // Writes when half of the time has gone. Aborted: somebody else has it.

@@ -103,8 +103,9 @@ v1::Attempt RunningAttempt(const OpenJob& job) {
 
 }  // namespace
 
-WorkerService::WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store)
-    : lease_(lease), retry_(retry), store_(store) {
+WorkerService::WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store,
+                             const Clock& monotonic)
+    : lease_(lease), retry_(retry), store_(store), monotonic_(monotonic), watch_(lease) {
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -263,21 +264,21 @@ absl::Status WorkerService::MakePass(std::list<Call>& calls) {
   MW_ASSIGN_OR_RETURN(const absl::Time now, store_.Now());
   MW_ASSIGN_OR_RETURN(std::vector<OpenJob> open, store_.ListOpenJobs());
   MW_RETURN_IF_ERROR(LookAtWorkers(now));
-  // Who could not be heard was not silent: after a pause of this coordinator (or its store) workers get some time.
-  if (now - last_pass_ > lease_.lease / 2) silence_counts_from_ = now + lease_.lease / 2;
   last_pass_ = now;
+  watch_.Observe(open, monotonic_.Now());
 
-  SchedulingPass pass(lease_, retry_, std::move(open), now, MemoryStepsOf(store_));
+  SchedulingPass pass(lease_, retry_, watch_, std::move(open), now, MemoryStepsOf(store_));
   for (Call& call : calls) {
     if (!call.is_heard) call.is_settled = pass.ApplyReport(call.report);
   }
-  pass.Expire(now >= silence_counts_from_);
+  pass.Expire();
   for (const Call& call : calls) {
     const auto worker = written_workers_.find(call.report.worker);
     if (worker == written_workers_.end() || !worker->second.drained) pass.Grant(call.report);
   }
   const std::vector<WorkerRecord> heartbeats = Heartbeats(calls, now);
   MW_ASSIGN_OR_RETURN(AppliedPass applied, ApplyPass(pass, heartbeats, store_, now));
+  watch_.Observe(pass.jobs(), monotonic_.Now());
   for (const WorkerRecord& worker : heartbeats) written_workers_[worker.id] = worker;
   for (AppliedPass::Claim& claim : applied.claims) {
     claimed_[{claim.reconstruction, claim.job.sequence}] = std::move(claim.job);
@@ -327,7 +328,9 @@ std::vector<WorkerRecord> WorkerService::Heartbeats(const std::list<Call>& calls
     const bool is_same = before.cores == heard.cores && before.memory_bytes == heard.memory_bytes &&
                          before.instance == heard.instance && before.version == heard.version &&
                          before.draining == heard.draining && before.method_version == heard.method_version;
-    if (!is_same || now - before.last_heartbeat > lease_.lease / 4) heartbeats.push_back(heard);
+    // One that is still to come was written before the clock was set back.
+    const absl::Duration age = now - before.last_heartbeat;
+    if (!is_same || age > lease_.lease / 4 || age < absl::ZeroDuration()) heartbeats.push_back(heard);
   }
   return heartbeats;
 }
@@ -335,11 +338,15 @@ std::vector<WorkerRecord> WorkerService::Heartbeats(const std::list<Call>& calls
 absl::Status WorkerService::LookAtWorkers(absl::Time now) {
   {
     const MutexLock lock(mutex_);
-    const bool is_due = now - last_look_at_workers_ >= std::min(lease_.lease / 4, kLookAtWorkers);
+    const absl::Duration age = now - last_look_at_workers_;
+    const bool is_due = age >= std::min(lease_.lease / 4, kLookAtWorkers) || age < absl::ZeroDuration();
     if (!is_due && !workers_changed_) return absl::OkStatus();
     workers_changed_ = false;
   }
-  MW_RETURN_IF_ERROR(store_.RemoveSilentWorkers(now - kLeasesUntilForgotten * lease_.lease));
+  // Not when the clock has just jumped, or nobody could be heard.
+  if (now - last_pass_ < lease_.lease) {
+    MW_RETURN_IF_ERROR(store_.RemoveSilentWorkers(now - kLeasesUntilForgotten * lease_.lease));
+  }
   MW_ASSIGN_OR_RETURN(const std::vector<WorkerRecord> workers, store_.ListWorkers());
   last_look_at_workers_ = now;
   written_workers_.clear();
@@ -424,7 +431,8 @@ std::vector<std::string> WorkerService::WarningsFor(const std::string& reconstru
   const MutexLock lock(mutex_);
   std::map<int64_t, int64_t> largest;  // method version -> memory of the largest worker that takes jobs
   for (const auto& [id, worker] : workers_) {
-    const bool is_alive = seen_at_ - worker.last_heartbeat <= lease_.lease && !worker.draining && !worker.drained;
+    const bool is_heard = absl::AbsDuration(seen_at_ - worker.last_heartbeat) <= lease_.lease;
+    const bool is_alive = is_heard && !worker.draining && !worker.drained;
     if (is_alive) largest[worker.method_version] = std::max(largest[worker.method_version], worker.memory_bytes);
   }
   std::vector<std::string> warnings;

@@ -17,6 +17,7 @@
 #include "meshwright/v1/reconstruction.pb.h"
 #include "meshwright/v1/worker.pb.h"
 
+#include "common/base/clock.h"
 #include "common/base/mutex.h"
 #include "coordinator/scheduling/apply_pass.h"
 #include "coordinator/scheduling/scheduling_pass.h"
@@ -32,8 +33,9 @@ class WorkerService {
  public:
   using Answer = std::function<void(absl::StatusOr<v1::SynchronizeResponse>)>;
 
-  // `store` outlives it.
-  WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store);
+  // `store` and `monotonic`, by which leases are timed, outlive it.
+  WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store,
+                const Clock& monotonic = kMonotonicClock);
   ~WorkerService();
 
   // Answers up to request.wait_timeout_seconds later, while there is nothing that the worker does not know; from
@@ -94,13 +96,14 @@ class WorkerService {
   const LeaseOptions lease_;
   const RetryOptions retry_;
   JobStore& store_;
+  const Clock& monotonic_;
 
   // Of the thread alone.
+  LeaseWatch watch_;
   std::map<std::pair<std::string, SequenceNumber>, CameraJob> claimed_;  // jobs that are leased from here, with specs
   std::map<std::string, Background> backgrounds_;
   std::map<std::string, WorkerRecord> written_workers_;
   absl::Time last_pass_ = absl::InfinitePast();
-  absl::Time silence_counts_from_ = absl::InfinitePast();
   absl::Time last_look_at_workers_ = absl::InfinitePast();
 
   mutable Mutex mutex_;

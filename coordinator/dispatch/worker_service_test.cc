@@ -64,8 +64,10 @@ class WorkerServiceTest : public testing::Test {
     ASSERT_TRUE(
         store_->CreateReconstruction({.id = "a", .options_json = "{}", .scene_digest = kDigest}, clock_.Now()).ok());
     epoch_ = *store_->AcquireConductorLease("a", "c", clock_.Now() + absl::Seconds(5), clock_.Now());
-    service_ = std::make_unique<WorkerService>(kLease, RetryOptions{.backoff = absl::ZeroDuration()}, *store_);
-    other_ = std::make_unique<WorkerService>(kLease, RetryOptions{.backoff = absl::ZeroDuration()}, *store_);
+    service_ =
+        std::make_unique<WorkerService>(kLease, RetryOptions{.backoff = absl::ZeroDuration()}, *store_, monotonic_);
+    other_ =
+        std::make_unique<WorkerService>(kLease, RetryOptions{.backoff = absl::ZeroDuration()}, *store_, monotonic_);
   }
   void TearDown() override {
     service_.reset();
@@ -108,6 +110,7 @@ class WorkerServiceTest : public testing::Test {
   void Pass(absl::Duration duration) {
     for (const absl::Time end = clock_.Now() + duration; clock_.Now() < end;) {
       clock_.Advance(absl::Seconds(5));
+      monotonic_.Advance(absl::Seconds(5));
       v1::SynchronizeRequest onlooker = Request("onlooker");
       onlooker.set_draining(true);
       Synchronize(onlooker);
@@ -118,12 +121,43 @@ class WorkerServiceTest : public testing::Test {
   static inline const std::string kDigest = std::string(64, 'e');
   static inline const LeaseOptions kLease = {.lease = absl::Seconds(30), .job_time_limit = absl::Hours(1)};
   std::string folder_;
-  SharedClock clock_;
+  SharedClock clock_;      // the store's
+  SharedClock monotonic_;  // the coordinators'
   std::unique_ptr<JobStore> store_;
   int64_t epoch_ = 0;  // of the lease of the reconstruction's conductor
   std::unique_ptr<WorkerService> service_;
   std::unique_ptr<WorkerService> other_;
 };
+
+// The store's clock is set an hour forward or back: who is heard keeps its job, who is silent loses it after its lease.
+TEST_F(WorkerServiceTest, AClockThatIsSetDecidesNothing) {
+  SequenceNumber sequence = 0;
+  for (const absl::Duration jump : {absl::Hours(1), absl::Hours(-1), absl::Hours(5), absl::Hours(-9)}) {
+    Offer(++sequence);
+    const v1::SynchronizeResponse first = Synchronize(Request("w"));
+    ASSERT_EQ(first.jobs_size(), 1);
+    v1::SynchronizeRequest running = Request("w");
+    *running.add_held() = Held(first.jobs(0));
+    clock_.Advance(jump);
+    for (int i = 0; i < 10; ++i) {
+      Pass(absl::Seconds(5));
+      ASSERT_EQ(Synchronize(running).jobs_size(), 1) << jump << " " << i;
+    }
+    EXPECT_EQ(Stored(sequence).losses, 0) << jump;
+    EXPECT_GE(service_->ListWorkers().workers_size(), 2) << jump;
+    clock_.Advance(jump);
+    Pass(absl::Seconds(20));
+    EXPECT_EQ(Stored(sequence).lease_worker, "w") << jump;
+    Pass(absl::Seconds(20));
+    EXPECT_EQ(Stored(sequence).lease_worker, "") << jump;
+    EXPECT_EQ(Stored(sequence).losses, 1) << jump;
+    // A backoff that was begun before a jump does not last for hours.
+    clock_.Advance(-absl::AbsDuration(jump));
+    const v1::SynchronizeResponse again = Synchronize(Request("v"));
+    ASSERT_EQ(again.jobs_size(), 1) << jump;
+    Synchronize(FinishedRequest("v", again.jobs(0), kDigest));
+  }
+}
 
 // A rolling upgrade and back: workers of both versions are connected, and each does what was begun with its own.
 TEST_F(WorkerServiceTest, WorkersOfOtherMethodsGetNothingAndCostNoCamera) {

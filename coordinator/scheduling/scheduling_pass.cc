@@ -39,10 +39,11 @@ absl::Status LeaseOptions::Validate() const {
   return absl::OkStatus();
 }
 
-SchedulingPass::SchedulingPass(const LeaseOptions& lease, const RetryOptions& retry, std::vector<OpenJob> open,
-                               absl::Time now, MemorySteps memory_steps)
+SchedulingPass::SchedulingPass(const LeaseOptions& lease, const RetryOptions& retry, const LeaseWatch& watch,
+                               std::vector<OpenJob> open, absl::Time now, MemorySteps memory_steps)
     : lease_(lease),
       retry_(retry),
+      watch_(watch),
       now_(now),
       memory_steps_(std::move(memory_steps)),
       jobs_(std::move(open)),
@@ -170,29 +171,33 @@ void SchedulingPass::ApplyFailed(size_t index, const JobFailed& failed) {
 
 void SchedulingPass::ApplyRunning(size_t index) {
   const OpenJob& job = jobs_[index];
-  if (job.lease_expires_at - now_ > kRenewBelow * lease_.lease) return;
-  if (now_ - job.leased_at > lease_.job_time_limit) return;  // Expire() sees to it
+  // One that seems to last longer than any was written before the clock was set back.
+  const absl::Duration left = job.lease_expires_at - now_;
+  if (left > kRenewBelow * lease_.lease && left <= lease_.lease) return;
+  if (watch_.TakesTooLong(job)) return;  // Expire() sees to it
   JobChange change = ChangeOf(JobChange::Kind::kRenew, job);
   change.expires_at = now_ + lease_.lease;
   Add(index, std::move(change));
 }
 
-void SchedulingPass::Expire(bool silence_counts) {
+void SchedulingPass::Expire() {
   for (size_t i = 0; i < jobs_.size(); ++i) {
     const OpenJob& job = jobs_[i];
     if (job.lease_worker.empty() || changed_[i]) continue;
-    if (now_ - job.leased_at > lease_.job_time_limit) {
+    if (watch_.TakesTooLong(job)) {
       Add(i, FailureOf(job, absl::StrCat("took longer than ", absl::FormatDuration(lease_.job_time_limit)), false));
-    } else if (silence_counts && job.lease_expires_at <= now_) {
+    } else if (watch_.HasRunOut(job)) {
       JobChange change = LossOf(job, absl::StrCat("worker ", job.lease_worker, " is silent"), false);
-      change.only_if_expired_at = now_;
+      change.only_if_expired_at = job.lease_expires_at;  // not if it has been renewed since
       Add(i, std::move(change));
     }
   }
 }
 
 bool SchedulingPass::Fits(const OpenJob& job, const WorkerReport& report, int64_t free_bytes) const {
-  return job.method_version == report.method_version && job.not_before <= now_ && job.memory_bytes <= free_bytes;
+  // A pause that seems longer than any was begun before the clock was set back.
+  const bool is_ready = job.not_before <= now_ || job.not_before - now_ > retry_.max_backoff;
+  return is_ready && job.method_version == report.method_version && job.memory_bytes <= free_bytes;
 }
 
 void SchedulingPass::Grant(const WorkerReport& report) {
@@ -227,7 +232,12 @@ void SchedulingPass::Grant(const WorkerReport& report) {
 void SchedulingPass::ApplyOutcome(const Change& decided, const JobChangeResult& result) {
   OpenJob& job = jobs_[decided.job];
   if (decided.change.kind != JobChange::Kind::kClaim) {
-    if (result.status.ok() && decided.change.kind != JobChange::Kind::kRenew) job.lease_worker.clear();
+    if (!result.status.ok()) return;
+    if (decided.change.kind == JobChange::Kind::kRenew) {
+      job.lease_expires_at = decided.change.expires_at;
+    } else {
+      job.lease_worker.clear();
+    }
     return;
   }
   if (result.status.ok()) {

@@ -11,17 +11,12 @@
 #include <absl/status/status.h>
 #include <absl/time/time.h>
 
+#include "coordinator/scheduling/lease_options.h"
+#include "coordinator/scheduling/lease_watch.h"
 #include "coordinator/scheduling/worker_report.h"
 #include "coordinator/store/job_store.h"
 
 namespace meshwright {
-
-struct LeaseOptions {
-  absl::Duration lease = absl::Seconds(30);        // a worker that is silent longer has lost its jobs
-  absl::Duration job_time_limit = absl::Hours(2);  // a job that takes longer has failed, however alive its worker is
-
-  absl::Status Validate() const;
-};
 
 struct RetryOptions {
   int max_failures = 3;  // a camera whose job failed so often is skipped, >= 1
@@ -39,15 +34,16 @@ class SchedulingPass {
   // What a job needs when it is made smaller 0, 1, 2 ... times, bytes.
   using MemorySteps = std::function<std::vector<int64_t>(const OpenJob& job)>;
 
-  // `lease` and `retry` outlive the pass.
-  SchedulingPass(const LeaseOptions& lease, const RetryOptions& retry, std::vector<OpenJob> open, absl::Time now,
-                 MemorySteps memory_steps);
+  // `lease`, `retry` and `watch`, which has observed `open`, outlive the pass. `now`: of the store, whose clock may
+  // jump.
+  SchedulingPass(const LeaseOptions& lease, const RetryOptions& retry, const LeaseWatch& watch,
+                 std::vector<OpenJob> open, absl::Time now, MemorySteps memory_steps);
 
   // What a worker says: results, failures, what runs. Ends what an earlier process of it held. Returns whether there
   // was something that the worker waits to be rid of.
   bool ApplyReport(const WorkerReport& report);
   // Ends leases that ran out, or of jobs that take too long.
-  void Expire(bool silence_counts);
+  void Expire();
   // Gives the worker what it can take and has the method for: of the reconstruction with the fewest leases for its
   // weight first, of one reconstruction by sequence.
   void Grant(const WorkerReport& report);
@@ -79,6 +75,7 @@ class SchedulingPass {
 
   const LeaseOptions& lease_;
   const RetryOptions& retry_;
+  const LeaseWatch& watch_;
   const absl::Time now_;
   const MemorySteps memory_steps_;
   std::vector<OpenJob> jobs_;

@@ -1,5 +1,7 @@
 #include "coordinator/scheduling/scheduling_pass.h"
 
+#include <deque>
+
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -43,10 +45,23 @@ WorkerReport Worker(const std::string& id, int cores = 1, int64_t memory_bytes =
 
 HeldJob& Hold(WorkerReport& report, const OpenJob& job) { return report.held.emplace_back(HeldJob{KeyOf(job), {}}); }
 
-SchedulingPass Plan(std::vector<OpenJob> jobs, absl::Time now = kNow) {
-  return SchedulingPass(kLease, kRetry, std::move(jobs), now, [](const OpenJob&) {
+// `watch`: it has observed the jobs.
+SchedulingPass Plan(std::vector<OpenJob> jobs, absl::Time now = kNow, const LeaseWatch& watch = LeaseWatch(kLease)) {
+  // Outlives the passes that look at it; a pass by itself has nothing to say of time.
+  static std::deque<LeaseWatch> watches;
+  watches.push_back(watch);
+  return SchedulingPass(kLease, kRetry, watches.back(), std::move(jobs), now, [](const OpenJob&) {
     return std::vector<int64_t>{10, 5, 2};
   });
+}
+
+// Has seen the jobs unchanged for so long.
+LeaseWatch Watched(const std::vector<OpenJob>& jobs, absl::Duration age) {
+  LeaseWatch watch(kLease);
+  absl::Time now = absl::UnixEpoch();
+  for (const absl::Time end = now + age; now < end; now += absl::Seconds(1)) watch.Observe(jobs, now);
+  watch.Observe(jobs, now);
+  return watch;
 }
 
 // "kind reconstruction sequence" of each change.
@@ -130,32 +145,42 @@ TEST(SchedulingPassTest, BackoffIsWaitedFor) {
   SchedulingPass plan = Plan({job}, kNow + absl::Seconds(5));
   plan.Grant(Worker("w"));
   EXPECT_THAT(Changes(plan), ElementsAre("claim a1"));
+  // Longer than any: the clock was set back.
+  SchedulingPass back = Plan({job}, kNow - absl::Hours(1));
+  back.Grant(Worker("w"));
+  EXPECT_THAT(Changes(back), ElementsAre("claim a1"));
 }
 
+// Whatever the store's clock says now.
 TEST(SchedulingPassTest, ASilentWorkerLosesItsLeasesAndAHeardOneKeepsThem) {
   const OpenJob silent = Leased("a", 1, "s", absl::Seconds(31));
   const OpenJob heard = Leased("a", 2, "h", absl::Seconds(31));
   WorkerReport report = Worker("h");
   Hold(report, heard);
-  SchedulingPass plan = Plan({silent, heard});
-  EXPECT_FALSE(plan.ApplyReport(report));
-  plan.Expire(true);
-  EXPECT_THAT(Changes(plan), ElementsAre("renew a2", "lose a1"));
-  EXPECT_EQ(plan.changes()[1].change.only_if_expired_at, kNow);
-  // After a pause of the coordinator, silence says nothing.
-  SchedulingPass paused = Plan({silent});
-  paused.Expire(false);
-  EXPECT_THAT(Changes(paused), IsEmpty());
+  for (const absl::Duration jump : {absl::ZeroDuration(), absl::Hours(1), -absl::Hours(1)}) {
+    SchedulingPass plan = Plan({silent, heard}, kNow + jump, Watched({silent, heard}, absl::Seconds(31)));
+    EXPECT_FALSE(plan.ApplyReport(report));
+    plan.Expire();
+    EXPECT_THAT(Changes(plan), ElementsAre("renew a2", "lose a1")) << jump;
+    EXPECT_EQ(plan.changes()[1].change.only_if_expired_at, silent.lease_expires_at);
+    SchedulingPass early = Plan({silent}, kNow + jump, Watched({silent}, absl::Seconds(29)));
+    early.Expire();
+    EXPECT_THAT(Changes(early), IsEmpty()) << jump;
+  }
 }
 
 TEST(SchedulingPassTest, AWorkerThatHangsAndIsAliveLosesTheJobToo) {
-  OpenJob job = Leased("a", 1, "w", absl::Seconds(101));
-  job.lease_expires_at = kNow + absl::Seconds(5);
+  OpenJob job = Leased("a", 1, "w");
   WorkerReport report = Worker("w");
   Hold(report, job);
-  SchedulingPass plan = Plan({job});
+  LeaseWatch watch(kLease);
+  for (int seconds = 0; seconds <= 101; ++seconds) {
+    job.lease_expires_at += absl::Seconds(1);
+    watch.Observe({job}, absl::FromUnixSeconds(seconds));
+  }
+  SchedulingPass plan = Plan({job}, kNow, watch);
   plan.ApplyReport(report);
-  plan.Expire(true);
+  plan.Expire();
   ASSERT_THAT(Changes(plan), ElementsAre("fail a1"));
   EXPECT_THAT(plan.changes()[0].change.reason, HasSubstr("took longer"));
 }

@@ -325,9 +325,10 @@ class JobStore {
                                                           int64_t limit = std::numeric_limits<int64_t>::max()) = 0;
 
   // Takes a reconstruction that nobody conducts (or no longer, or `owner` itself) and returns the epoch, which grows
-  // with every call: who conducted before cannot write any more. FailedPrecondition while somebody else holds it.
+  // with every call: who conducted before cannot write any more. FailedPrecondition while somebody else's lease lasts
+  // beyond `lapsed_by`: now, or where it has stood unchanged for its length, whatever a clock says, what it lasts to.
   virtual absl::StatusOr<int64_t> AcquireConductorLease(const std::string& id, const std::string& owner,
-                                                        absl::Time expires_at, absl::Time now) = 0;
+                                                        absl::Time expires_at, absl::Time lapsed_by) = 0;
   // Aborted when the epoch is not the current one.
   virtual absl::Status RenewConductorLease(const std::string& id, int64_t epoch, absl::Time expires_at,
                                            absl::Time now) = 0;

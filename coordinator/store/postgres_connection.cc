@@ -7,11 +7,11 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
-#include <absl/time/clock.h>
 #include <libpq-fe.h>
 #include <poll.h>
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 
 namespace meshwright {
 
@@ -146,7 +146,7 @@ PostgresError PostgresConnection::ResultError(const pg_result* result) {
 
 bool PostgresConnection::WaitForInput(absl::Time deadline) {
   while (PQisBusy(connection_) != 0) {
-    const absl::Duration left = deadline - absl::Now();
+    const absl::Duration left = deadline - MonotonicNow();
     if (left <= absl::ZeroDuration()) return false;
     pollfd socket = {.fd = PQsocket(connection_), .events = POLLIN, .revents = 0};
     const int ready = ::poll(&socket, 1, static_cast<int>(absl::ToInt64Milliseconds(left)) + 1);

@@ -11,6 +11,7 @@
 #include <absl/time/clock.h>
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 #include "common/base/mutex.h"
 #include "common/base/status_macros.h"
 #include "coordinator/store/postgres_connection.h"
@@ -108,7 +109,7 @@ class PostgresDatabase : public SqlDatabase {
 
   // Runs the action until it succeeds, is refused, or retry_deadline ends.
   absl::Status Attempt(const Action& action) {
-    const absl::Time deadline = absl::Now() + options_.retry_deadline;
+    const absl::Time deadline = MonotonicNow() + options_.retry_deadline;
     std::unique_ptr<PostgresConnection> connection;
     if (!TakeTurn(deadline, &connection)) {
       return absl::UnavailableError(
@@ -137,7 +138,7 @@ class PostgresDatabase : public SqlDatabase {
       if (error.fault == PostgresFault::kBroken) connection.reset();
       if (error.fault == PostgresFault::kFinal) break;
       if (error.fault == PostgresFault::kTransient && ++transient_errors == kTransientAttempts) break;
-      if (absl::Now() + pause >= deadline) break;
+      if (MonotonicNow() + pause >= deadline) break;
       // A connection that lay in the pool may have died long ago: no reason to wait before making a new one.
       if (error.fault == PostgresFault::kBroken && !is_new) continue;
       absl::SleepFor(pause);
@@ -151,7 +152,7 @@ class PostgresDatabase : public SqlDatabase {
   bool TakeTurn(absl::Time deadline, std::unique_ptr<PostgresConnection>* connection) {
     MutexLock lock(mutex_);
     while (running_ >= options_.connections) {
-      const absl::Duration left = deadline - absl::Now();
+      const absl::Duration left = deadline - MonotonicNow();
       if (left <= absl::ZeroDuration()) return false;
       freed_.WaitFor(lock, absl::ToChronoNanoseconds(left));
     }

@@ -47,7 +47,7 @@ class SqlJobStore : public JobStore {
   absl::StatusOr<std::vector<Attempt>> ListAttempts(const std::string& id, int64_t limit) override;
   absl::StatusOr<std::vector<Commit>> ListCommits(const std::string& id, SequenceNumber after, int64_t limit) override;
   absl::StatusOr<int64_t> AcquireConductorLease(const std::string& id, const std::string& owner, absl::Time expires_at,
-                                                absl::Time now) override;
+                                                absl::Time lapsed_by) override;
   absl::Status RenewConductorLease(const std::string& id, int64_t epoch, absl::Time expires_at,
                                    absl::Time now) override;
   absl::Status ReleaseConductorLease(const std::string& id, int64_t epoch, absl::Time now) override;

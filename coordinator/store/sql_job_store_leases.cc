@@ -188,13 +188,12 @@ absl::Status SqlJobStore::CheckConductor(const std::string& id, int64_t epoch) {
 }
 
 absl::StatusOr<int64_t> SqlJobStore::AcquireConductorLease(const std::string& id, const std::string& owner,
-                                                           absl::Time expires_at, absl::Time now) {
-  if (expires_at <= now) return absl::InvalidArgumentError("a lease must expire after now");
+                                                           absl::Time expires_at, absl::Time lapsed_by) {
   MW_ASSIGN_OR_RETURN(const SqlResult result,
                       database_->Run("acquire_conductor_lease", {{"id", id},
                                                                  {"owner", owner},
                                                                  {"expires_at", absl::ToUnixMicros(expires_at)},
-                                                                 {"now", absl::ToUnixMicros(now)}}));
+                                                                 {"lapsed_by", absl::ToUnixMicros(lapsed_by)}}));
   if (!result.rows.empty()) return result.rows.front().Integer(0);
   MW_RETURN_IF_ERROR(GetReconstruction(id).status());
   return absl::FailedPreconditionError(absl::StrCat("reconstruction ", id, " is conducted by another coordinator"));

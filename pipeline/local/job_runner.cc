@@ -125,7 +125,8 @@ absl::Status JobRunner::PassOnce() {
   MW_ASSIGN_OR_RETURN(const absl::Time now, parts_.store.Now());
   MW_RETURN_IF_ERROR(parts_.lease.RenewIfDue(now));
   MW_ASSIGN_OR_RETURN(std::vector<OpenJob> open, parts_.store.ListOpenJobs());
-  SchedulingPass pass(kLease, kRetry, std::move(open), now, MemoryStepsOf(parts_.store));
+  const LeaseWatch watch(kLease);  // nobody can be silent
+  SchedulingPass pass(kLease, kRetry, watch, std::move(open), now, MemoryStepsOf(parts_.store));
   const WorkerReport report = Report();
   pass.ApplyReport(report);
   pass.Grant(report);

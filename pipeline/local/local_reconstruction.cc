@@ -188,8 +188,9 @@ class LocalReconstruction {
       cameras_.push_back(UndistortedCamera(view, options_.max_image_size));
     }
     blobs_.emplace(work_->blobs());
+    const absl::Time now = clock_.Now();
     MW_ASSIGN_OR_RETURN(lease_, HeldConductorLease::Acquire(work_->store(), WorkFolder::kReconstructionId, kConductor,
-                                                            kConductorLease, clock_.Now()));
+                                                            kConductorLease, now, /*lapsed_by=*/now));
     MW_ASSIGN_OR_RETURN(const ReconstructionConfig config, ParseConfig(ToJson(options_).dump()));
     const OuterLoopEnvironment environment = {
         .store = &work_->store(), .blobs = &*blobs_, .clock = &clock_, .pool = &pool_};

@@ -10,8 +10,8 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <absl/time/clock.h>
 
+#include "common/base/clock.h"
 #include "common/base/status_macros.h"
 #include "common/base/utf8.h"
 #include "worker/job_input/run_job.h"
@@ -88,14 +88,14 @@ void Agent::Drain() {
     const MutexLock lock(mutex_);
     if (draining_) return;
     draining_ = true;
-    drain_until_ = absl::Now() + options_.drain;
+    drain_until_ = MonotonicNow() + options_.drain;
   }
   wake_.NotifyAll();
   channel_.Interrupt();
 }
 
 v1::SynchronizeRequest Agent::NextRequest() {
-  const absl::Time now = absl::Now();
+  const absl::Time now = MonotonicNow();
   v1::SynchronizeRequest request;
   request.set_worker_id(options_.worker_id);
   request.set_instance(instance_);
@@ -150,7 +150,7 @@ void Agent::Follow(const v1::SynchronizeResponse& response) {
       Held& held = held_[key];
       *held.told.mutable_key() = job->key();
       held.told.mutable_running();
-      held.begun = absl::Now();
+      held.begun = MonotonicNow();
       held.thread = std::thread([this, key = key, job = *job] { Work(key, job); });
     }
   }
@@ -160,9 +160,9 @@ void Agent::Follow(const v1::SynchronizeResponse& response) {
 void Agent::Work(const Key& key, const v1::CameraJob& job) {
   const Logger log = log_.With(FieldsOf(job.key())).With({{"camera", static_cast<int64_t>(job.camera())}});
   log.Info("job begun");
-  const absl::Time begun = absl::Now();
+  const absl::Time begun = MonotonicNow();
   v1::HeldJob told = Process(job);
-  const double seconds = absl::ToDoubleSeconds(absl::Now() - begun);
+  const double seconds = absl::ToDoubleSeconds(MonotonicNow() - begun);
   if (told.has_failed()) {
     log.Error("job failed", {{"seconds", seconds}, {"error", told.failed().reason()}});
   } else {
@@ -172,7 +172,7 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
     const MutexLock lock(mutex_);
     if (told.has_finished()) failures_ = 0;
     if (told.has_failed() && told.failed().infrastructure()) {
-      backoff_until_ = absl::Now() + std::min(kMaxBackoff, kMinBackoff * (int64_t{1} << std::min(failures_++, 20)));
+      backoff_until_ = MonotonicNow() + std::min(kMaxBackoff, kMinBackoff * (int64_t{1} << std::min(failures_++, 20)));
     }
     Held& held = held_.at(key);
     held.told = std::move(told);
@@ -233,7 +233,7 @@ void Agent::Run() {
     if (response.ok() || absl::IsCancelled(response.status())) continue;
     log_.Warning("no answer from the coordinator", {{"error", std::string(response.status().message())}});
     MutexLock lock(mutex_);
-    if (absl::Now() >= drain_until_) return;
+    if (MonotonicNow() >= drain_until_) return;
     wake_.WaitFor(lock, retry);
     retry = std::min(2 * retry, kLastRetry);
   }

@@ -207,7 +207,7 @@ INSERT INTO conductor_leases AS held (reconstruction_id, owner, epoch, expires_a
 SELECT id, CAST(:owner AS TEXT), 1, CAST(:expires_at AS BIGINT) FROM reconstructions WHERE id = :id
 ON CONFLICT (reconstruction_id) DO UPDATE
 SET owner = excluded.owner, epoch = held.epoch + 1, expires_at = excluded.expires_at
-WHERE held.expires_at <= :now OR held.owner = excluded.owner
+WHERE held.expires_at <= :lapsed_by OR held.owner = excluded.owner
 RETURNING epoch;
 
 -- name: renew_conductor_lease

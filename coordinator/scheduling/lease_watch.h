@@ -1,0 +1,40 @@
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include <absl/time/time.h>
+
+#include "coordinator/scheduling/lease_options.h"
+#include "coordinator/scheduling/worker_report.h"
+#include "coordinator/store/job_store.h"
+
+namespace meshwright {
+
+// How long leases of camera jobs have stood in the store as they are, by this process's monotonic clock. Times in the
+// store are of a clock that may jump, by an hour at that: what they say is never held against a worker.
+class LeaseWatch {
+ public:
+  explicit LeaseWatch(const LeaseOptions& lease) : lease_(lease) {}
+
+  // What the store says now. Who is not looked at for more than half a lease gets half a lease more: its worker could
+  // not be heard.
+  void Observe(const std::vector<OpenJob>& open, absl::Time monotonic_now);
+  // Its worker has not renewed it for the length of a lease.
+  bool HasRunOut(const OpenJob& job) const;
+  bool TakesTooLong(const OpenJob& job) const;
+
+ private:
+  struct Seen {
+    absl::Time expires_at;       // as stored
+    absl::Time unchanged_since;  // monotonic, as the next
+    absl::Time first;
+  };
+
+  const LeaseOptions lease_;
+  absl::Time now_ = absl::InfinitePast();
+  std::map<JobKey, Seen> leases_;
+};
+
+}  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0
