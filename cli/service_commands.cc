@@ -20,6 +20,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+// How long whoever waits for a reconstruction waits for a coordinator that does not answer any more.
+constexpr absl::Duration kCoordinatorMayBeAway = absl::Minutes(15);
+constexpr absl::Duration kAskAgain = absl::Seconds(1);
 constexpr char kStatePrefix[] = "RECONSTRUCTION_STATE_";
 
 struct Arguments {
@@ -190,14 +193,28 @@ Json ToJson(const v1::Reconstruction& reconstruction) {
 
 int WatchUntilOver(const ServiceArguments& arguments, ServiceClient& client, const std::string& id) {
   v1::Reconstruction last;
-  const absl::Status status = client.Watch(id, [&](const v1::Reconstruction& now) {
+  absl::Time last_answer = absl::Now();
+  const auto tell = [&](const v1::Reconstruction& now) {
     const bool news =
         now.state() != last.state() || now.progress().cameras_committed() != last.progress().cameras_committed();
     last = now;
+    last_answer = absl::Now();
     if (arguments.output.quiet || !news) return;
     std::fprintf(stderr, "%s: %s, cameras %d/%d\n", id.c_str(), NameOf(now.state()).c_str(),
                  now.progress().cameras_committed(), now.progress().cameras_total());
-  });
+  };
+  absl::Status status = client.Watch(id, tell);
+  // It has answered before: it is being restarted, or the network is away for a while.
+  const bool has_answered = !last.id().empty() || !IsNobodyThere(status);
+  bool told = false;
+  while (has_answered && absl::IsUnavailable(status) && absl::Now() - last_answer < kCoordinatorMayBeAway) {
+    if (!told && !arguments.output.quiet) {
+      std::fprintf(stderr, "%s: the coordinator does not answer; waiting for it\n", id.c_str());
+    }
+    told = true;
+    absl::SleepFor(kAskAgain);
+    status = client.Watch(id, tell);
+  }
   if (!status.ok()) return FailCall(status, arguments);
   const int shown = Show(last, arguments);
   return last.state() == v1::RECONSTRUCTION_STATE_DONE ? shown : kExitFailed;

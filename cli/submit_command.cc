@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
@@ -19,6 +20,8 @@
 #include "cli/reconstruction_flags.h"
 #include "cli/service_arguments.h"
 #include "common/base/bad_input.h"
+#include "common/base/digest.h"
+#include "common/base/files.h"
 #include "common/base/status_macros.h"
 #include "common/base/utf8.h"
 #include "common/json/json_text.h"
@@ -89,17 +92,48 @@ absl::StatusOr<std::vector<std::string>> FilesOf(const std::string& folder) {
   return files;
 }
 
-absl::Status Upload(const Arguments& arguments, const std::vector<std::string>& files, ServiceClient& client) {
-  int sent = 0;
+absl::StatusOr<std::string> DigestOfFile(const std::string& path) {
+  MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  return Sha256Hex(bytes);
+}
+
+// Where each file that is sent comes from: the scene's folder, or --region.
+std::map<std::string, std::string> Sources(const Arguments& arguments, const std::vector<std::string>& files) {
+  std::map<std::string, std::string> sources;
+  for (const std::string& file : files) sources[file] = (fs::path(arguments.scene.path) / file).string();
   const std::string& region = arguments.scene.import.region;
-  if (!region.empty() && region != kNoRegion) {
-    MW_RETURN_IF_ERROR(client.Upload(arguments.id, kRegionFile, region));
+  if (region == kNoRegion) sources.erase(kRegionFile);
+  if (!region.empty() && region != kNoRegion) sources[kRegionFile] = region;
+  return sources;
+}
+
+// Sends what is not there yet. An id that was used before stands for one scene: FailedPrecondition when this is
+// another.
+absl::Status Upload(const Arguments& arguments, const std::vector<std::string>& files, bool is_started,
+                    ServiceClient& client) {
+  const std::map<std::string, std::string> sources = Sources(arguments, files);
+  MW_ASSIGN_OR_RETURN(const v1::ListSceneFilesResponse there, client.ListSceneFiles(arguments.id));
+  std::map<std::string, std::string> digests;  // of what is there
+  for (const v1::SceneFile& file : there.files()) digests[file.path()] = file.sha256();
+  const auto another = [&](const std::string& file, const char* what) {
+    return absl::FailedPreconditionError(
+        absl::StrCat(arguments.id, " was submitted with another scene: ", file, " ", what, "; choose another --id"));
+  };
+  for (const auto& [file, digest] : digests) {
+    if (sources.count(file) == 0) return another(file, "is not in this one");
   }
-  for (const std::string& file : files) {
-    if (file == kRegionFile && !region.empty()) continue;
-    MW_RETURN_IF_ERROR(client.Upload(arguments.id, file, (fs::path(arguments.scene.path) / file).string()));
+  int sent = 0;
+  for (const auto& [file, path] : sources) {
+    const auto found = digests.find(file);
+    if (found == digests.end() && is_started) return another(file, "was not in it");
+    if (found != digests.end()) {
+      MW_ASSIGN_OR_RETURN(const std::string digest, DigestOfFile(path));
+      if (digest != found->second) return another(file, "has other bytes");
+      continue;
+    }
+    MW_RETURN_IF_ERROR(client.Upload(arguments.id, file, path));
     if (!arguments.service.output.quiet && ++sent % 50 == 0) {
-      std::fprintf(stderr, "%s: %d/%d files uploaded\n", arguments.id.c_str(), sent, static_cast<int>(files.size()));
+      std::fprintf(stderr, "%s: %d/%d files uploaded\n", arguments.id.c_str(), sent, static_cast<int>(sources.size()));
     }
   }
   return absl::OkStatus();
@@ -151,9 +185,10 @@ int Submit(Arguments& arguments) {
   if (by_reference) request.set_scene_reference(arguments.scene.path);
   const absl::StatusOr<v1::Reconstruction> created = client->Create(request);
   if (!created.ok()) return FailCall(created.status(), arguments.service);
-  if (!by_reference && created->state() == v1::RECONSTRUCTION_STATE_CREATED) {
-    if (const absl::Status status = Upload(arguments, files, *client); !status.ok())
-      return FailCall(status, arguments.service);
+  if (!by_reference) {
+    const bool is_started = created->state() != v1::RECONSTRUCTION_STATE_CREATED;
+    const absl::Status uploaded = Upload(arguments, files, is_started, *client);
+    if (!uploaded.ok()) return FailCall(uploaded, arguments.service);
   }
   const absl::StatusOr<v1::Reconstruction> started = client->Start(arguments.id);
   if (!started.ok()) return FailCall(started.status(), arguments.service);

@@ -22,6 +22,7 @@ namespace {
 constexpr size_t kChunkBytes = size_t{256} << 10;
 constexpr std::chrono::seconds kCallDeadline(60);
 constexpr int kMaxMessageBytes = 64 << 20;
+constexpr int kMaxReconnectBackoffMs = 2000;
 
 absl::Status FromGrpc(const grpc::Status& status) {
   if (status.ok()) return absl::OkStatus();
@@ -59,6 +60,14 @@ class RealServiceClient final : public ServiceClient {
     }
     if (open) writer->WritesDone();
     return FromGrpc(writer->Finish());
+  }
+
+  absl::StatusOr<v1::ListSceneFilesResponse> ListSceneFiles(const std::string& id) override {
+    v1::ListSceneFilesRequest request;
+    request.set_id(id);
+    v1::ListSceneFilesResponse response;
+    MW_RETURN_IF_ERROR(Call(&v1::ReconstructionService::Stub::ListSceneFiles, request, response));
+    return response;
   }
 
   absl::StatusOr<v1::Reconstruction> Start(const std::string& id) override {
@@ -223,6 +232,8 @@ std::unique_ptr<ServiceClient> ServiceClient::Connect(const std::string& address
                                                       const ServiceCredentials& credentials) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
+  // Who waits for a coordinator that is being restarted wants to know soon that it is there again.
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectBackoffMs);
   return std::make_unique<RealServiceClient>(
       grpc::CreateCustomChannel(address,
                                 credentials.ca_certificates.empty()

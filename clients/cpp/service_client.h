@@ -27,6 +27,7 @@ class ServiceClient {
   virtual absl::StatusOr<v1::Reconstruction> Create(const v1::CreateReconstructionRequest& request) = 0;
   // The file `local_path` becomes `path` of the scene.
   virtual absl::Status Upload(const std::string& id, const std::string& path, const std::string& local_path) = 0;
+  virtual absl::StatusOr<v1::ListSceneFilesResponse> ListSceneFiles(const std::string& id) = 0;
   virtual absl::StatusOr<v1::Reconstruction> Start(const std::string& id) = 0;
   virtual absl::StatusOr<v1::Reconstruction> Get(const std::string& id) = 0;
   virtual absl::StatusOr<v1::ListReconstructionsResponse> List(const std::string& page_token) = 0;

@@ -42,6 +42,15 @@ grpc::Status Answer(const absl::StatusOr<Value>& value, const Fill& fill) {
   return ToGrpc(value.status());
 }
 
+void FillFiles(const std::vector<SceneFile>& files, v1::ListSceneFilesResponse& response) {
+  for (const SceneFile& file : files) {
+    v1::SceneFile& told = *response.add_files();
+    told.set_path(file.path);
+    told.set_size_bytes(file.size_bytes);
+    told.set_sha256(file.digest);
+  }
+}
+
 template <typename Response>
 absl::Status SendBytes(const std::string& bytes, grpc::ServerWriter<Response>& writer) {
   for (size_t begin = 0; begin < bytes.size(); begin += kChunkBytes) {
@@ -87,6 +96,15 @@ class ReconstructionServiceImpl final : public v1::ReconstructionService::Servic
     const absl::StatusOr<Caller> caller = Identify(gate_, *context);
     if (!caller.ok()) return ToGrpc(caller.status());
     return ToGrpc(long_calls_.Run(NameFor(*caller), [&] { return Upload(*caller, *reader); }));
+  }
+  grpc::Status ListSceneFiles(grpc::ServerContext* context, const v1::ListSceneFilesRequest* request,
+                              v1::ListSceneFilesResponse* response) override {
+    return Guarded(gate_, *context,
+                   {.action = Action::kRead, .deed = "ListSceneFiles", .reconstruction = request->id()},
+                   [&](const Caller&) {
+                     return Answer(service_.ListSceneFiles(request->id()),
+                                   [&](const std::vector<SceneFile>& files) { FillFiles(files, *response); });
+                   });
   }
   grpc::Status StartReconstruction(grpc::ServerContext* context, const v1::StartReconstructionRequest* request,
                                    v1::StartReconstructionResponse* response) override {

@@ -224,6 +224,15 @@ TEST_F(GrpcServerTest, AFileIsThereWholeOrNotAtAll) {
   ASSERT_TRUE(Upload({Header("castle", bytes), Chunk(bytes.substr(0, 7)), Chunk(bytes.substr(7))}).ok());
   ASSERT_EQ(store_->ListSceneFiles("castle")->size(), 1);
   EXPECT_EQ(*blobs_->Get(store_->ListSceneFiles("castle")->front().digest), bytes);
+  grpc::ClientContext context;
+  v1::ListSceneFilesRequest request;
+  request.set_id("castle");
+  v1::ListSceneFilesResponse response;
+  ASSERT_TRUE(reconstructions_->ListSceneFiles(&context, request, &response).ok());
+  ASSERT_EQ(response.files_size(), 1);
+  EXPECT_EQ(response.files(0).path(), "images/a.png");
+  EXPECT_EQ(response.files(0).size_bytes(), 300'000);
+  EXPECT_EQ(response.files(0).sha256(), Sha256Hex(bytes));
 }
 
 TEST_F(GrpcServerTest, AMessageLargerThanGrpcTakesEndsTheCallAndNothingElse) {

@@ -91,6 +91,42 @@ TEST(ServiceTest, EverybodyShowsAKey) {
   EXPECT_EQ(service.Client({"token", "create", "--user", "a", "--expires", "soon", "--token-file", root}).exit_code, 2);
 }
 
+TEST(ServiceTest, WhoWaitsGoesOnWhenTheCoordinatorIsRestarted) {
+  RunningService service;
+  auto coordinator = service.StartCoordinator();
+  const std::string log = service.folder() / "waiting.log";
+  const std::string mesh = service.folder() / "waited.ply";
+  const BackgroundProgram waiting(
+      MESHWRIGHT_PROGRAM,
+      With({"submit", SharedScene("small"), "--id", "waited", "-o", mesh, "--coordinator", service.address()},
+           kQuickOptions),
+      log);
+  ASSERT_TRUE(WaitUntil([&] { return ReadBytes(log).find("running") != std::string::npos; }, 60)) << ReadBytes(log);
+  coordinator->Stop(SIGKILL);
+  ASSERT_TRUE(WaitUntil([&] { return ReadBytes(log).find("waiting for it") != std::string::npos; }, 30))
+      << ReadBytes(log);
+  coordinator = service.StartCoordinator();
+  const auto worker = service.StartWorker("first");
+  EXPECT_TRUE(service.WaitForMesh("waited") == service.LocalMesh(SharedScene("small"), kQuickOptions));
+  EXPECT_TRUE(WaitUntil([&] { return ReadBytes(mesh).size() > 10'000; }, 30)) << ReadBytes(log);
+}
+
+TEST(ServiceTest, AnIdThatWasUsedStandsForItsScene) {
+  RunningService service;
+  const auto coordinator = service.StartCoordinator();
+  const auto submit = [&](const std::string& scene) {
+    return service.Client(With({"submit", scene, "--id", "one"}, kQuickOptions));
+  };
+  ASSERT_EQ(submit(SharedScene("small")).exit_code, 0);
+  EXPECT_EQ(submit(SharedScene("small")).exit_code, 0) << "the same again";
+  const RunResult other = submit(SharedScene("turn"));
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_THAT(other.err, testing::HasSubstr("one was submitted with another scene"));
+  const RunResult options = service.Client({"submit", SharedScene("small"), "--id", "one", "--window", "1"});
+  EXPECT_EQ(options.exit_code, 1);
+  EXPECT_THAT(options.err, testing::HasSubstr("another reconstruction"));
+}
+
 TEST(ServiceTest, ACoordinatorThatIsNotThereIsAFailureInOneLine) {
   const RunResult result = RunMeshwright({"status", "--coordinator", "127.0.0.1:1"});
   EXPECT_EQ(result.exit_code, 1);
