@@ -10,6 +10,7 @@
 #include "program/usage_error.h"
 
 #include "cli/commands.h"
+#include "common/base/version.h"
 
 int main(int argc, char** argv) {
   using namespace meshwright;
@@ -19,7 +20,7 @@ int main(int argc, char** argv) {
       "Meshwright turns photographs into a triangle mesh (Jancosek, Shekhovtsov, "
       "Pajdla: Scalable Multi-View Stereo, 2009).",
       "meshwright");
-  program.set_version_flag("--version", absl::StrCat("meshwright ", MW_VERSION));
+  program.set_version_flag("--version", absl::StrCat("meshwright ", kProgramVersion));
   program.require_subcommand(1);
   program.footer(
       "meshwright COMMAND --help shows a command's options and examples.\n"

@@ -19,6 +19,7 @@
 #include "common/base/files.h"
 #include "common/base/nearest_name.h"
 #include "common/base/status_macros.h"
+#include "common/base/version.h"
 
 namespace meshwright {
 namespace {
@@ -117,7 +118,7 @@ class CompletedArguments {
 }  // namespace
 
 std::optional<int> ParseProgram(CLI::App& program, int argc, char** argv, const std::function<absl::Status()>& check) {
-  program.set_version_flag("--version", absl::StrCat(program.get_name(), " ", MW_VERSION));
+  program.set_version_flag("--version", absl::StrCat(program.get_name(), " ", kProgramVersion));
   std::string config;
   bool check_only = false;
   NameInEnvironment(

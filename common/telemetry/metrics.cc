@@ -7,6 +7,7 @@
 #include <absl/strings/str_cat.h>
 #include <prometheus/text_serializer.h>
 
+#include "common/base/version.h"
 #include "common/telemetry/process_metrics.h"
 
 namespace meshwright {
@@ -19,7 +20,7 @@ constexpr double kSlowestCallSeconds = 50;
 
 Metrics::Metrics(const std::string& program) : process_({std::make_shared<ProcessMetrics>()}) {
   Gauge("meshwright_build_info", "Always 1; its labels say which program of which version this is.",
-        {{"program", program}, {"version", MW_VERSION}})
+        {{"program", program}, {"version", kProgramVersion}})
       .Set(1);
 }
 

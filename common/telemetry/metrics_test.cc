@@ -4,8 +4,11 @@
 #include <string>
 #include <vector>
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "common/base/version.h"
 
 namespace meshwright {
 namespace {
@@ -16,7 +19,8 @@ using testing::Not;
 
 TEST(MetricsTest, SaysWhichProgramItIs) {
   const std::string text = Metrics("worker").Text();
-  EXPECT_THAT(text, HasSubstr("meshwright_build_info{program=\"worker\",version=\"" MW_VERSION "\"} 1\n"));
+  EXPECT_THAT(
+      text, HasSubstr(absl::StrCat("meshwright_build_info{program=\"worker\",version=\"", kProgramVersion, "\"} 1\n")));
   for (const char* const name : {"process_cpu_seconds_total", "process_resident_memory_bytes", "process_open_fds",
                                  "process_max_fds", "process_threads", "process_start_time_seconds"}) {
     EXPECT_THAT(text, HasSubstr(std::string("\n") + name + " ")) << name;

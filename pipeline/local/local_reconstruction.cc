@@ -22,6 +22,7 @@
 #include "common/base/files.h"
 #include "common/base/process_usage.h"
 #include "common/base/status_macros.h"
+#include "common/base/version.h"
 #include "common/blob/lost_blob.h"
 #include "common/json/json_text.h"
 #include "common/mesh/formats/mesh_format.h"
@@ -315,7 +316,7 @@ class LocalReconstruction {
   Json MakeReport(const JoinedMeshCounts& counts, Json cameras) const {
     const ProcessUsage usage = MeasureProcessUsage();
     Json report;
-    report["program"] = absl::StrCat("meshwright ", MW_VERSION);
+    report["program"] = absl::StrCat("meshwright ", kProgramVersion);
     report["mesh"] = {{"path", settings_.output_path},
                       {"vertices", counts.vertices},
                       {"faces", counts.faces},

@@ -12,6 +12,7 @@
 #include "common/base/files.h"
 #include "common/base/host_port.h"
 #include "common/base/status_macros.h"
+#include "common/base/version.h"
 #include "common/blob/open_blob_store.h"
 #include "common/telemetry/log.h"
 #include "common/telemetry/measured_blob_store.h"
@@ -54,7 +55,7 @@ class RealWorkerProgram final : public WorkerProgram {
         blobs_(shared_blobs_ != nullptr ? *shared_blobs_ : *coordinator_, metrics_),
         agent_(
             {.worker_id = id_,
-             .version = MW_VERSION,
+             .version = kProgramVersion,
              .cores = settings.cores,
              .memory_bytes = MemoryMib(settings) << 20,
              .drain = absl::Seconds(settings.drain_seconds),

@@ -31,7 +31,7 @@ export class FakeApi {
       memoryBytes: String(16 * 2 ** 30),
       draining: false,
       jobs: i < 7 ? 3 : 0,
-      version: '0.1.0',
+      version: '0.2.0',
     }));
     const workers = this.workers.slice(0, 7).map((worker) => worker.id);
     const make = (more) =>
