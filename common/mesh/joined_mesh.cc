@@ -8,9 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include <absl/strings/str_cat.h>
-
 #include "common/base/check.h"
+#include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
 #include "common/mesh/border_stitching.h"
 #include "common/mesh/disjoint_sets.h"
@@ -299,19 +298,13 @@ class PartWriter {
 }  // namespace
 
 absl::Status JoinOptions::Validate() const {
-  if (min_component_faces < 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("min_component_faces is ", min_component_faces, ", expected at least 0"));
-  }
+  if (min_component_faces < 0) return OutOfRange("min_component_faces", min_component_faces, "at least 0");
   if (!(max_hole_steps >= 0 && max_hole_steps <= 1000)) {
-    return absl::InvalidArgumentError(absl::StrCat("max_hole_steps is ", max_hole_steps, ", expected 0 to 1000"));
+    return OutOfRange("max_hole_steps", max_hole_steps, "0 to 1000");
   }
-  if (blend_steps < 0 || blend_steps > 1000) {
-    return absl::InvalidArgumentError(absl::StrCat("blend_steps is ", blend_steps, ", expected 0 to 1000"));
-  }
+  if (blend_steps < 0 || blend_steps > 1000) return OutOfRange("blend_steps", blend_steps, "0 to 1000");
   if (!(simplify_footprints >= 0 && simplify_footprints <= 100)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("simplify_footprints is ", simplify_footprints, " pixel footprints, expected 0 to 100"));
+    return OutOfRange("simplify_footprints", simplify_footprints, "0 to 100 pixel footprints");
   }
   return absl::OkStatus();
 }

@@ -7,6 +7,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
 #include "coordinator/incidence/pair_rows.h"
 
@@ -126,20 +127,20 @@ void AddCounts(const FeasiblePairCounts& row, FeasiblePairCounts& sum) {
 
 absl::Status FeasiblePairOptions::Validate() const {
   if (min_common_points < 1) {
-    return absl::InvalidArgumentError(absl::StrCat("min_common_points = ", min_common_points, ", expected >= 1"));
+    return OutOfRange("min_common_points", min_common_points, ">= 1");
   }
   if (!(min_angle_deg >= 0 && min_angle_deg <= max_angle_deg && max_angle_deg <= 180)) {
     return absl::InvalidArgumentError(absl::StrCat(
         "min_angle_deg = ", min_angle_deg, ", max_angle_deg = ", max_angle_deg, ", expected 0 <= min <= max <= 180"));
   }
   if (!(min_scale_ratio >= 0 && min_scale_ratio <= 1)) {
-    return absl::InvalidArgumentError(absl::StrCat("min_scale_ratio = ", min_scale_ratio, ", expected 0..1"));
+    return OutOfRange("min_scale_ratio", min_scale_ratio, "0..1");
   }
   if (min_pairs_per_camera < 0) {
-    return absl::InvalidArgumentError(absl::StrCat("min_pairs_per_camera = ", min_pairs_per_camera, ", expected >= 0"));
+    return OutOfRange("min_pairs_per_camera", min_pairs_per_camera, ">= 0");
   }
   if (!(min_frustum_overlap > 0 && min_frustum_overlap <= 1)) {
-    return absl::InvalidArgumentError(absl::StrCat("min_frustum_overlap = ", min_frustum_overlap, ", expected 0..1"));
+    return OutOfRange("min_frustum_overlap", min_frustum_overlap, "0..1");
   }
   return absl::OkStatus();
 }

@@ -196,7 +196,8 @@ TEST(FeasiblePairs, ThreadsDoNotMatter) {
 
 TEST(FeasiblePairs, OptionsNameWhatIsWrong) {
   EXPECT_TRUE(FeasiblePairOptions().Validate().ok());
-  EXPECT_THAT(FeasiblePairOptions{.min_common_points = 0}.Validate().ToString(), HasSubstr("min_common_points = 0"));
+  EXPECT_THAT(FeasiblePairOptions{.min_common_points = 0}.Validate().ToString(),
+              HasSubstr("min_common_points is 0, expected >= 1"));
   EXPECT_FALSE(FeasiblePairOptions{.min_angle_deg = 60}.Validate().ok());
   EXPECT_FALSE(FeasiblePairOptions{.min_scale_ratio = 1.5}.Validate().ok());
   EXPECT_FALSE(FeasiblePairOptions{.min_pairs_per_camera = -1}.Validate().ok());

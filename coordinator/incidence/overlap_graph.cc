@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <absl/strings/str_cat.h>
+#include "common/base/out_of_range.h"
 
 namespace meshwright {
 namespace {
@@ -27,12 +27,8 @@ bool SeesProbes(const CameraGeometry& a, const CameraProbes& probes_of_a, const 
 }  // namespace
 
 absl::Status OverlapOptions::Validate() const {
-  if (!(min_share >= 0 && min_share <= 1)) {
-    return absl::InvalidArgumentError(absl::StrCat("min_share = ", min_share, ", expected 0..1"));
-  }
-  if (!(max_angle_deg >= 0 && max_angle_deg <= 180)) {
-    return absl::InvalidArgumentError(absl::StrCat("max_angle_deg = ", max_angle_deg, ", expected 0..180"));
-  }
+  if (!(min_share >= 0 && min_share <= 1)) return OutOfRange("min_share", min_share, "0..1");
+  if (!(max_angle_deg >= 0 && max_angle_deg <= 180)) return OutOfRange("max_angle_deg", max_angle_deg, "0..180");
   return absl::OkStatus();
 }
 

@@ -6,6 +6,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "common/base/out_of_range.h"
+
 namespace meshwright {
 namespace {
 
@@ -35,7 +37,7 @@ struct ProbeScore {
 
 absl::Status TargetSelectionOptions::Validate() const {
   if (max_targets < 1) {
-    return absl::InvalidArgumentError(absl::StrCat("max_targets = ", max_targets, ", expected >= 1"));
+    return OutOfRange("max_targets", max_targets, ">= 1");
   }
   if (!(best_min_angle_deg > 0 && best_min_angle_deg <= best_max_angle_deg && best_max_angle_deg <= 90)) {
     return absl::InvalidArgumentError(absl::StrCat("best_min_angle_deg = ", best_min_angle_deg,
@@ -43,7 +45,7 @@ absl::Status TargetSelectionOptions::Validate() const {
                                                    ", expected 0 < min <= max <= 90"));
   }
   if (!(apart_angle_deg > 0 && apart_angle_deg <= 90)) {
-    return absl::InvalidArgumentError(absl::StrCat("apart_angle_deg = ", apart_angle_deg, ", expected > 0, <= 90"));
+    return OutOfRange("apart_angle_deg", apart_angle_deg, "> 0, <= 90");
   }
   return absl::OkStatus();
 }

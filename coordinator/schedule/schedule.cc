@@ -3,15 +3,15 @@
 #include <absl/strings/str_cat.h>
 
 #include "common/base/check.h"
+#include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
 
 namespace meshwright {
 
 absl::Status ScheduleOptions::Validate() const {
-  if (window < 1) return absl::InvalidArgumentError(absl::StrCat("window = ", window, ", expected >= 1"));
+  if (window < 1) return OutOfRange("window", window, ">= 1");
   if (max_overlap_in_flight < 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("max_overlap_in_flight = ", max_overlap_in_flight, ", expected >= 0"));
+    return OutOfRange("max_overlap_in_flight", max_overlap_in_flight, ">= 0");
   }
   return absl::OkStatus();
 }

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <utility>
 
-#include <absl/strings/str_cat.h>
 #include <absl/time/clock.h>
 
 #include "common/base/check.h"
+#include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
 
 namespace meshwright {
@@ -44,9 +44,7 @@ std::vector<SparsePointObservation> ObservationsOf(const CameraJobInput& input) 
 }  // namespace
 
 absl::Status CameraJobOptions::Validate() const {
-  if (lattice_step < 1 || lattice_step > 16) {
-    return absl::InvalidArgumentError(absl::StrCat("lattice_step is ", lattice_step, " px, expected 1..16"));
-  }
+  if (lattice_step < 1 || lattice_step > 16) return OutOfRange("lattice_step", lattice_step, "1..16 px");
   MW_RETURN_IF_ERROR(scoring.Validate());
   MW_RETURN_IF_ERROR(seeding.Validate());
   MW_RETURN_IF_ERROR(growing.Validate());

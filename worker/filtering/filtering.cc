@@ -6,8 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include <absl/strings/str_cat.h>
-
+#include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
 
 namespace meshwright {
@@ -93,18 +92,15 @@ std::vector<int32_t> OrderByNode(const PatchStacks& stacks, std::vector<int32_t>
   return order;
 }
 
-absl::Status OutOfRange(const char* field, double value, const char* expected) {
-  return absl::InvalidArgumentError(absl::StrCat("filtering.", field, " is ", value, ", expected ", expected));
-}
-
 }  // namespace
 
 absl::Status FilteringOptions::Validate() const {
-  if (!(no_patch_cost >= 0)) return OutOfRange("no_patch_cost", no_patch_cost, ">= 0");
-  if (!(boundary_cost >= 0)) return OutOfRange("boundary_cost", boundary_cost, ">= 0");
-  if (!(max_plane_distance_steps > 0)) return OutOfRange("max_plane_distance_steps", max_plane_distance_steps, "> 0");
+  if (!(no_patch_cost >= 0)) return OutOfRange("filtering.no_patch_cost", no_patch_cost, ">= 0");
+  if (!(boundary_cost >= 0)) return OutOfRange("filtering.boundary_cost", boundary_cost, ">= 0");
+  if (!(max_plane_distance_steps > 0))
+    return OutOfRange("filtering.max_plane_distance_steps", max_plane_distance_steps, "> 0");
   if (!(max_normal_angle_deg >= 0 && max_normal_angle_deg <= 180)) {
-    return OutOfRange("max_normal_angle_deg", max_normal_angle_deg, "0..180");
+    return OutOfRange("filtering.max_normal_angle_deg", max_normal_angle_deg, "0..180");
   }
   MW_RETURN_IF_ERROR(trws.Validate());
   return refinement.Validate();

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include <absl/strings/str_cat.h>
-
+#include "common/base/out_of_range.h"
 #include "worker/filtering/smoothing.h"
 
 namespace meshwright {
@@ -65,23 +64,14 @@ float InverseDepthPerPixel(const PatchScorer& scorer, int x, int y, const PatchP
 }  // namespace
 
 absl::Status RefinementOptions::Validate() const {
-  if (rounds < 0 || rounds > 8) {
-    return absl::InvalidArgumentError(absl::StrCat("refinement.rounds is ", rounds, ", expected 0..8"));
-  }
-  if (window_radius < 1 || window_radius > 7) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("refinement.window_radius is ", window_radius, " px, expected 1..7"));
-  }
+  if (rounds < 0 || rounds > 8) return OutOfRange("refinement.rounds", rounds, "0..8");
+  if (window_radius < 1 || window_radius > 7) return OutOfRange("refinement.window_radius", window_radius, "1..7 px");
   if (smoothing_radius_steps < 0 || smoothing_radius_steps > 8) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("refinement.smoothing_radius_steps is ", smoothing_radius_steps, ", expected 0..8"));
+    return OutOfRange("refinement.smoothing_radius_steps", smoothing_radius_steps, "0..8");
   }
-  if (!(first_step_px > 0)) {
-    return absl::InvalidArgumentError(absl::StrCat("refinement.first_step_px is ", first_step_px, ", expected > 0"));
-  }
+  if (!(first_step_px > 0)) return OutOfRange("refinement.first_step_px", first_step_px, "> 0");
   if (slope_radius_steps < 1 || slope_radius_steps > 8) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("refinement.slope_radius_steps is ", slope_radius_steps, ", expected 1..8"));
+    return OutOfRange("refinement.slope_radius_steps", slope_radius_steps, "1..8");
   }
   return absl::OkStatus();
 }

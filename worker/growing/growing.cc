@@ -6,9 +6,8 @@
 #include <cstdlib>
 #include <string>
 
-#include <absl/strings/str_cat.h>
-
 #include "common/base/check.h"
+#include "common/base/out_of_range.h"
 #include "worker/growing/open_queue.h"
 
 namespace meshwright {
@@ -233,22 +232,18 @@ class Grower {
   std::vector<std::array<int, 2>> normal_offsets_;  // lattice steps
 };
 
-absl::Status OutOfRange(const char* field, double value, const char* expected) {
-  return absl::InvalidArgumentError(absl::StrCat("growing.", field, " is ", value, ", expected ", expected));
-}
-
 }  // namespace
 
 absl::Status GrowingOptions::Validate() const {
-  if (!(min_quality >= -1 && min_quality <= 1)) return OutOfRange("min_quality", min_quality, "-1..1");
+  if (!(min_quality >= -1 && min_quality <= 1)) return OutOfRange("growing.min_quality", min_quality, "-1..1");
   if (!(max_quality_deficit >= 0 && max_quality_deficit <= 2)) {
-    return OutOfRange("max_quality_deficit", max_quality_deficit, "0..2");
+    return OutOfRange("growing.max_quality_deficit", max_quality_deficit, "0..2");
   }
   if (max_patches_per_ray < 1 || max_patches_per_ray > 32) {
-    return OutOfRange("max_patches_per_ray", max_patches_per_ray, "1..32");
+    return OutOfRange("growing.max_patches_per_ray", max_patches_per_ray, "1..32");
   }
   if (!(normal_radius_steps >= 1 && normal_radius_steps <= 16)) {
-    return OutOfRange("normal_radius_steps", normal_radius_steps, "1..16");
+    return OutOfRange("growing.normal_radius_steps", normal_radius_steps, "1..16");
   }
   return absl::OkStatus();
 }

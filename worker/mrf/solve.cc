@@ -6,6 +6,7 @@
 #include <absl/strings/str_format.h>
 
 #include "common/base/check.h"
+#include "common/base/out_of_range.h"
 #include "worker/mrf/window.h"
 
 namespace meshwright {
@@ -73,13 +74,13 @@ MrfSolution Solve(const GridMrf& mrf, const TrwsOptions& options, int window_nod
 
 absl::Status TrwsOptions::Validate() const {
   if (max_iterations < 1) {
-    return absl::InvalidArgumentError(absl::StrFormat("trws.max_iterations is %d, must be >= 1", max_iterations));
+    return OutOfRange("trws.max_iterations", max_iterations, ">= 1");
   }
   if (!(message_tolerance >= 0.0) || !std::isfinite(message_tolerance)) {
-    return absl::InvalidArgumentError(absl::StrFormat("trws.message_tolerance is %g, must be >= 0", message_tolerance));
+    return OutOfRange("trws.message_tolerance", message_tolerance, ">= 0");
   }
   if (margin_nodes < 1) {
-    return absl::InvalidArgumentError(absl::StrFormat("trws.margin_nodes is %d, must be >= 1", margin_nodes));
+    return OutOfRange("trws.margin_nodes", margin_nodes, ">= 1");
   }
   if (window_nodes < 2 * margin_nodes + 2) {
     return absl::InvalidArgumentError(absl::StrFormat("trws.window_nodes is %d, must be >= 2 * margin_nodes + 2 = %d",

@@ -5,9 +5,8 @@
 #include <limits>
 #include <tuple>
 
-#include <absl/strings/str_format.h>
-
 #include "common/base/check.h"
+#include "common/base/out_of_range.h"
 #include "common/geometry/level_of_detail.h"
 #include "worker/seeding/corner_seeds.h"
 #include "worker/seeding/point_seeds.h"
@@ -80,16 +79,10 @@ std::vector<TaggedSeed> KeepBestPerNode(std::vector<TaggedSeed> seeds, const Cam
 
 absl::Status SeedingOptions::Validate() const {
   if (!(min_apical_angle_deg >= 0 && min_apical_angle_deg <= 60)) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("seeding.min_apical_angle_deg is %g, must be in 0..60", min_apical_angle_deg));
+    return OutOfRange("seeding.min_apical_angle_deg", min_apical_angle_deg, "0..60");
   }
-  if (min_seeds_per_pair < 0) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("seeding.min_seeds_per_pair is %d, must not be negative", min_seeds_per_pair));
-  }
-  if (!(min_quality >= -1 && min_quality <= 1)) {
-    return absl::InvalidArgumentError(absl::StrFormat("seeding.min_quality is %g, must be in -1..1", min_quality));
-  }
+  if (min_seeds_per_pair < 0) return OutOfRange("seeding.min_seeds_per_pair", min_seeds_per_pair, ">= 0");
+  if (!(min_quality >= -1 && min_quality <= 1)) return OutOfRange("seeding.min_quality", min_quality, "-1..1");
   return absl::OkStatus();
 }
 
