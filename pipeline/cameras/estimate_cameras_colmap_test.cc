@@ -10,6 +10,8 @@
 #include "pipeline/cameras/estimate_cameras.h"
 #include "pipeline/cameras/photographs_testing.h"
 
+#include "common/base/files.h"
+
 namespace meshwright {
 namespace {
 
@@ -19,7 +21,7 @@ TEST(EstimateCamerasWithColmap, ThreadsHaveNoInfluence) {
   const std::filesystem::path images =
       std::filesystem::path(data == nullptr ? "../shared/data" : data) / "phone-fox/images";
   if (!std::filesystem::exists(images) || !FindColmap("colmap").ok()) GTEST_SKIP() << "no photographs or no COLMAP";
-  const TestFolder folder;
+  const TemporaryFolder folder;
   std::vector<std::filesystem::path> files(std::filesystem::directory_iterator(images), {});
   std::sort(files.begin(), files.end());
   std::filesystem::create_directories(folder / "p");

@@ -83,7 +83,7 @@ class EstimateCamerasTest : public testing::Test {
     return steps;
   }
 
-  TestFolder folder_;
+  TemporaryFolder folder_;
   RealClock clock_;
   CameraEstimationSettings settings_;
   std::vector<CameraProgress> progress_;

@@ -80,15 +80,6 @@ RunResult RunMeshwright(const std::vector<std::string>& arguments, const RunSett
 
 nlohmann::json JsonOf(const RunResult& result) { return nlohmann::json::parse(result.out, nullptr, false); }
 
-TemporaryFolder::TemporaryFolder() : path_(testing::TempDir() + "meshwright_XXXXXX") {
-  MW_CHECK(mkdtemp(path_.data()) != nullptr);
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code error;
-  fs::remove_all(path_, error);
-}
-
 std::string ReadBytes(const std::string& path) {
   std::ifstream stream(path, std::ios::binary);
   std::ostringstream bytes;

@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sys/types.h>
 
+#include "common/base/temporary_folder_testing.h"
+
 namespace meshwright::end_to_end {
 
 // How a run of the program ended.
@@ -29,21 +31,6 @@ RunResult RunMeshwright(const std::vector<std::string>& arguments, const RunSett
 
 // The JSON that a run printed; discarded() when it printed none.
 nlohmann::json JsonOf(const RunResult& result);
-
-// A folder of its own, removed at the end.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  const std::string& path() const { return path_; }
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
 
 std::string ReadBytes(const std::string& path);
 void WriteBytes(const std::string& path, const std::string& bytes);

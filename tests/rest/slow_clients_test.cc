@@ -123,7 +123,7 @@ class SlowClientsTest : public testing::Test {
     return *status == 200 ? text : "";
   }
 
-  const end_to_end::TemporaryFolder folder_;
+  const TemporaryFolder folder_;
   RealClock clock_;
   ThreadPool pool_{1};
   std::unique_ptr<JobStore> store_;

@@ -74,7 +74,7 @@ double Percentile(std::vector<double>& values, double share) {
 }
 
 int Measure(const Settings& settings) {
-  const end_to_end::TemporaryFolder folder;
+  const TemporaryFolder folder;
   WallWorld(settings.cameras).Write(folder / "scenes/large");
   if (settings.reconstructions > 1) WallWorld(settings.small_cameras).Write(folder / "scenes/small");
 

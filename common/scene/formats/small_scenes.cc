@@ -3,35 +3,16 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
-#include <system_error>
 #include <utility>
 #include <vector>
 
-#include <gtest/gtest.h>
-#include <unistd.h>
-
 #include "common/base/check.h"
+#include "common/base/temporary_folder_testing.h"
 #include "common/image/encode.h"
 #include "common/scene/formats/assemble.h"
 
 namespace meshwright {
 namespace {
-
-// One for the process, so that two runs of the tests may go on at the same time.
-class TemporaryFolder {
- public:
-  TemporaryFolder() : path_(JoinPath(testing::TempDir(), "scene_test_" + std::to_string(::getpid()))) {}
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 void AddPictures(const std::string& folder, SceneFiles* files) {
   for (const char* name : {"a.png", "b.png", "c.png"}) (*files)[JoinPath(folder, name)] = SmallPicture();
