@@ -4,9 +4,9 @@
 #include <system_error>
 
 #include <absl/strings/str_cat.h>
-#include <unistd.h>
 
 #include "cli/service_arguments.h"
+#include "common/base/files.h"
 #include "common/base/status_macros.h"
 #include "common/mesh/formats/mesh_format.h"
 #include "common/mesh/ply.h"
@@ -44,7 +44,7 @@ absl::Status FetchPly(ServiceClient& client, const std::string& id, const std::s
 absl::Status FetchMesh(ServiceClient& client, const std::string& id, const std::string& path, bool partial) {
   MW_ASSIGN_OR_RETURN(const MeshFormat* format, MeshFormatOfPath(path));
   if (IsPly(*format)) return FetchPly(client, id, path, partial);
-  const std::string ply = absl::StrCat(path, ".partial-", ::getpid(), ".ply");
+  const std::string ply = PartialPath(path) + ".ply";
   absl::Status fetched = FetchPly(client, id, ply, partial);
   if (fetched.ok()) fetched = ConvertPly(ply, *format, false, path);
   std::error_code error;

@@ -111,10 +111,9 @@ AtomicFile::~AtomicFile() {
 }
 
 absl::StatusOr<AtomicFile> AtomicFile::Create(const std::string& asked_path) {
-  static std::atomic<int> counter{0};
   MW_ASSIGN_OR_RETURN(const std::string path, ReplaceableFile(asked_path));
   while (true) {
-    const std::string temporary = absl::StrCat(path, kPartial, ::getpid(), "-", counter.fetch_add(1));
+    const std::string temporary = PartialPath(path);
     // Processes of several containers may share a folder and have the same number: only one of them gets the name.
     const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
     if (descriptor >= 0) return AtomicFile(path, temporary, descriptor);
@@ -172,6 +171,21 @@ absl::Status WriteFileAtomically(const std::string& path, absl::Span<const uint8
 
 absl::Status WriteFileAtomically(const std::string& path, const std::string& bytes) {
   return WriteFileAtomically(path, absl::MakeConstSpan(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()));
+}
+
+std::string PartialPath(const std::string& path) {
+  static std::atomic<int> counter{0};
+  return absl::StrCat(path, kPartial, ::getpid(), "-", counter.fetch_add(1));
+}
+
+void RemovePartialFiles(const std::string& path) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(path).parent_path();
+  const std::string prefix = fs::path(path).filename().string() + kPartial;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
+    if (entry.path().filename().string().rfind(prefix, 0) == 0) fs::remove(entry.path(), error);
+  }
 }
 
 void RemoveStalePartialFiles(const std::string& folder, absl::Duration age) {

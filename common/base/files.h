@@ -44,6 +44,13 @@ class AtomicFile {
 absl::Status WriteFileAtomically(const std::string& path, const std::string& bytes);
 absl::Status WriteFileAtomically(const std::string& path, absl::Span<const uint8_t> bytes);
 
+// The name of a file beside `path` that nobody else in this or another process uses: what is being written and not
+// `path` yet. Such files are what the next two functions remove.
+std::string PartialPath(const std::string& path);
+
+// Removes what processes that died while they wrote `path` left beside it. Errors are ignored: it is a matter of space.
+void RemovePartialFiles(const std::string& path);
+
 // Removes what AtomicFiles of processes that died left in `folder` and below, when nothing was written to it for `age`.
 // Errors are ignored: it is a matter of space only.
 void RemoveStalePartialFiles(const std::string& folder, absl::Duration age);

@@ -99,6 +99,22 @@ TEST_F(FilesTest, OnlyStalePartialFilesAreRemoved) {
   EXPECT_TRUE(fs::exists(whole));
 }
 
+TEST_F(FilesTest, PartialFilesOfOnePathAreRemovedAlone) {
+  const std::string path = (folder_ / "mesh.ply").string();
+  const std::string other = (folder_ / "mesh.ply2").string();
+  const std::string left = PartialPath(path);
+  const std::string left_by_other = PartialPath(other);
+  EXPECT_NE(left, PartialPath(path)) << "a name of its own each time";
+  for (const std::string& file : {path, other, left, left_by_other}) {
+    ASSERT_TRUE(WriteFileAtomically(file, std::string("x")).ok());
+  }
+  RemovePartialFiles(path);
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_TRUE(fs::exists(path));
+  EXPECT_TRUE(fs::exists(other));
+  EXPECT_TRUE(fs::exists(left_by_other));
+}
+
 }  // namespace
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -84,16 +84,6 @@ FileStamp StampOf(const std::string& path) {
   return {fs::file_size(path, error), fs::last_write_time(path, error)};
 }
 
-// What a process killed while it wrote `path` left beside it.
-void RemovePartialFiles(const std::string& path) {
-  const fs::path folder = fs::path(path).parent_path();
-  const std::string prefix = fs::path(path).filename().string() + ".partial-";
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
-    if (entry.path().filename().string().rfind(prefix, 0) == 0) fs::remove(entry.path(), error);
-  }
-}
-
 // NNNN_name.ply, in the order of commits.
 std::string PartName(const Scene& scene, const AcceptedSurface& surface) {
   std::string name = fs::path(scene.views[static_cast<size_t>(surface.camera)].name).stem().string();
