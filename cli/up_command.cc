@@ -11,6 +11,7 @@
 #include "program/program_options.h"
 
 #include "cli/commands.h"
+#include "common/base/host_port.h"
 #include "coordinator/main/coordinator_options.h"
 #include "coordinator/main/key_file.h"
 #include "worker/main/worker_program.h"
@@ -33,11 +34,11 @@ struct Arguments {
 
 // Where this machine reaches what listens at `listen`: all addresses (0.0.0.0, [::]) include the loopback one, and
 // every other is reached by itself.
-std::string OwnAddress(const std::string& listen, int port) {
-  std::string host = listen.substr(0, listen.rfind(':'));
-  if (host.empty() || host == "0.0.0.0" || host == "*") host = "127.0.0.1";
-  if (host == "[::]") host = "[::1]";
-  return absl::StrCat(host, ":", port);
+std::string OwnAddress(const HostPort& listen, int port) {
+  HostPort own = {.host = listen.host, .port = port};
+  if (own.host == "0.0.0.0") own.host = "127.0.0.1";
+  if (own.host == "::") own.host = "::1";
+  return ToString(own);
 }
 
 // Where callers have to show a key, the workers here need one too.
@@ -55,13 +56,15 @@ int Up(Arguments& arguments) {
   settings.threads = AvailableCores();
   KeepFilesPrivate();
   if (settings.blobs.empty()) settings.blobs = settings.data_folder + "/blobs";
+  const absl::StatusOr<HostPort> listen = ParseHostPort(settings.listen, "--listen");
+  if (!listen.ok()) return FailWrongUse(std::string(listen.status().message()));
   if (const absl::Status made = MakeWorkerKey(settings); !made.ok()) return Fail(made);
   const auto coordinator = CoordinatorProgram::Start(settings);
   if (!coordinator.ok()) return Fail(coordinator.status());
   std::vector<std::unique_ptr<WorkerProgram>> workers;
   std::vector<std::thread> threads;
   for (int i = 0; i < arguments.workers; ++i) {
-    auto worker = WorkerProgram::Make({.coordinator = OwnAddress(settings.listen, (*coordinator)->port()),
+    auto worker = WorkerProgram::Make({.coordinator = OwnAddress(*listen, (*coordinator)->port()),
                                        .id = absl::StrCat("local-", i + 1),
                                        .blobs = settings.blobs,
                                        .token_file = settings.worker_token_file,

@@ -34,5 +34,10 @@ bool IsLoopbackHost(const std::string& host) {
   return absl::EqualsIgnoreCase(host, "localhost") || host == "::1" || (is_ipv4 && absl::StartsWith(host, "127."));
 }
 
+std::string ToString(const HostPort& address) {
+  const bool is_ipv6 = address.host.find(':') != std::string::npos;
+  return absl::StrCat(is_ipv6 ? "[" : "", address.host, is_ipv6 ? "]" : "", ":", address.port);
+}
+
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -13,6 +13,8 @@ struct HostPort {
 
 // "HOST:PORT" or "[IPV6]:PORT". InvalidArgument calls the text by `name`: "--listen is \"7420\", expected host:port".
 absl::StatusOr<HostPort> ParseHostPort(const std::string& text, const std::string& name);
+// What ParseHostPort reads.
+std::string ToString(const HostPort& address);
 
 // Whether only this machine itself reaches `host`: "localhost", 127.x.y.z or ::1.
 bool IsLoopbackHost(const std::string& host);

@@ -15,6 +15,12 @@ TEST(HostPortTest, HostAndPort) {
   EXPECT_EQ(ParseHostPort("127.0.0.2:65535", "--listen")->port, 65535);
 }
 
+TEST(HostPortTest, TextGoesRound) {
+  for (const char* text : {"host.example:0", "0.0.0.0:7420", "[::1]:1", "[2001:db8::7]:65535"}) {
+    EXPECT_EQ(ToString(*ParseHostPort(text, "--listen")), text);
+  }
+}
+
 TEST(HostPortTest, WhatIsNoneIsNamed) {
   for (const char* text : {"", ":", "host", "7420", ":7420", "host:", "host:x", "host:65536", "host:-1", "host:+1",
                            "host: 1", "::1:7420", "[host]:1", "[]:1", "a host:1", "host:99999999999999"}) {

@@ -1,13 +1,10 @@
 #include "common/http_server/http_server.h"
 
 #include <algorithm>
-#include <limits>
 #include <thread>
 #include <utility>
 #include <vector>
 
-#include <absl/strings/match.h>
-#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
@@ -17,6 +14,7 @@
 #include <boost/asio/strand.hpp>
 #include <sys/resource.h>
 
+#include "common/base/host_port.h"
 #include "common/base/status_macros.h"
 #include "common/http_server/connection.h"
 #include "common/http_server/tls_files.h"
@@ -32,25 +30,6 @@ constexpr int kBacklog = 4096;
 constexpr rlim_t kOtherFiles = 512;
 constexpr std::chrono::milliseconds kAcceptAgain(100);
 constexpr absl::Duration kDestructorGrace = absl::Seconds(1);
-
-struct Address {
-  std::string host;
-  int port = 0;
-};
-
-absl::StatusOr<Address> ParseAddress(const std::string& text) {
-  const size_t colon = text.rfind(':');
-  Address address;
-  if (colon == std::string::npos || colon == 0 || !absl::SimpleAtoi(text.substr(colon + 1), &address.port) ||
-      address.port < 0 || address.port > std::numeric_limits<uint16_t>::max()) {
-    return absl::InvalidArgumentError(absl::StrCat("the address is \"", text, "\", expected host:port"));
-  }
-  address.host = text.substr(0, colon);
-  if (absl::StartsWith(address.host, "[") && absl::EndsWith(address.host, "]")) {
-    address.host = address.host.substr(1, address.host.size() - 2);
-  }
-  return address;
-}
 
 // Who is counted as one: an IPv4 address, or an IPv6 network of 64 bits, as one customer gets it.
 std::string CountedAddress(const net::ip::address& address) {
@@ -118,7 +97,7 @@ class BeastHttpServer final : public HttpServer {
 
  private:
   absl::Status Listen() {
-    MW_ASSIGN_OR_RETURN(const Address address, ParseAddress(core_.options.listen));
+    MW_ASSIGN_OR_RETURN(const HostPort address, ParseHostPort(core_.options.listen, "the address"));
     ErrorCode error;
     Tcp::resolver resolver(io_);
     const auto found = resolver.resolve(address.host, absl::StrCat(address.port),
