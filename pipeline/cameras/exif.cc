@@ -1,8 +1,11 @@
 #include "pipeline/cameras/exif.h"
 
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+
+#include "common/base/little_endian.h"
 
 namespace meshwright {
 namespace {
@@ -21,12 +24,13 @@ constexpr uint16_t kRational = 5;
 // The TIFF structure inside an EXIF block. Reads beyond its end give 0.
 class Tiff {
  public:
-  explicit Tiff(const std::string& bytes) : bytes_(bytes), big_endian_(bytes.compare(0, 2, "MM") == 0) {}
+  explicit Tiff(const std::string& bytes)
+      : bytes_(bytes), order_(bytes.compare(0, 2, "MM") == 0 ? std::endian::big : std::endian::little) {}
 
-  bool IsValid() const { return (big_endian_ || bytes_.compare(0, 2, "II") == 0) && U16(2) == 42; }
+  bool IsValid() const { return (order_ == std::endian::big || bytes_.compare(0, 2, "II") == 0) && U16(2) == 42; }
 
-  uint16_t U16(size_t at) const { return static_cast<uint16_t>(Unsigned(at, 2)); }
-  uint32_t U32(size_t at) const { return Unsigned(at, 4); }
+  uint16_t U16(size_t at) const { return Load<uint16_t>(at); }
+  uint32_t U32(size_t at) const { return Load<uint32_t>(at); }
 
   std::string Text(size_t entry) const {
     const size_t count = U32(entry + 4);
@@ -50,18 +54,14 @@ class Tiff {
   static constexpr size_t kLongestText = 256;
   static constexpr size_t kHeaderBytes = 8;
 
-  uint32_t Unsigned(size_t at, size_t size) const {
-    if (at > bytes_.size() || size > bytes_.size() - at) return 0;
-    uint32_t value = 0;
-    for (size_t i = 0; i < size; ++i) {
-      const size_t index = big_endian_ ? at + i : at + size - 1 - i;
-      value = (value << 8) | static_cast<uint8_t>(bytes_[index]);
-    }
-    return value;
+  template <typename T>
+  T Load(size_t at) const {
+    if (at > bytes_.size() || sizeof(T) > bytes_.size() - at) return 0;
+    return LoadScalar<T>(bytes_.data() + at, order_);
   }
 
   const std::string& bytes_;
-  const bool big_endian_;
+  const std::endian order_;
 };
 
 void ReadEntry(const Tiff& tiff, size_t entry, ExifCamera* camera, size_t* exif_folder) {
