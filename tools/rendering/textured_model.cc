@@ -135,7 +135,7 @@ Eigen::Vector2f PixelOf(const TexturedModel& model, int32_t face, uint32_t verte
 // One side of an edge of the surface, whatever vertices stand for its ends.
 struct EdgeSide {
   int32_t face = 0;
-  std::array<uint32_t, 3> corners;  // the edge from the first to the second
+  std::array<uint32_t, 3> corners = {};  // the edge from the first to the second
 };
 
 // Grey level half a pixel inside the face, `place` along the edge.
@@ -216,7 +216,7 @@ EdgeJumps MeasureEdgeJumps(const TexturedModel& model) {
       const auto key = std::pair(numbers[here.corners[0]], numbers[here.corners[1]]);
       const auto found = open.find({key.second, key.first});
       if (found == open.end()) {
-        open[key] = here;
+        open.emplace(key, here);
         continue;
       }
       const EdgeSide& there = found->second;  // runs the other way
