@@ -1,7 +1,5 @@
 #include "common/base/process_usage.h"
 
-#include <ctime>
-
 #include <sys/resource.h>
 
 namespace meshwright {
@@ -14,12 +12,6 @@ ProcessUsage MeasureProcessUsage() {
   };
   return {.cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime),
           .peak_rss_bytes = static_cast<int64_t>(usage.ru_maxrss) * 1024};
-}
-
-double ThreadCpuSeconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 }  // namespace meshwright

@@ -12,8 +12,5 @@ struct ProcessUsage {
 
 ProcessUsage MeasureProcessUsage();
 
-// CPU seconds of the calling thread.
-double ThreadCpuSeconds();
-
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

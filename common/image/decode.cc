@@ -98,11 +98,5 @@ absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std:
   return image;
 }
 
-absl::StatusOr<ColorImage> DecodeImage(const std::string& path) {
-  MW_RETURN_IF_ERROR(CheckRegularFile(path));
-  MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
-  return DecodeImageBytes(bytes, path);
-}
-
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -17,7 +17,7 @@ struct ImageSize {
   int height = 0;  // px
 };
 
-// Size that a picture's header tells, read without decoding it. Errors as for DecodeImage.
+// Size that a picture's header tells, read without decoding it. Errors as for DecodeImageBytes, and NotFound.
 absl::StatusOr<ImageSize> ReadImageSize(const std::string& path);
 
 // Decodes a JPEG, PNG or binary PGM/PPM to 8-bit RGB: 16-bit samples are scaled down, grey is replicated, transparency
@@ -25,9 +25,6 @@ absl::StatusOr<ImageSize> ReadImageSize(const std::string& path);
 // and gamma likewise. A picture is decoded whole or not at all: data that end early or do not decode cleanly are an
 // error, never filled with grey. Errors name the file: NotFound (no such file), InvalidArgument (not a picture, kind
 // not supported, truncated, damaged, larger than kMaxImagePixels).
-absl::StatusOr<ColorImage> DecodeImage(const std::string& path);
-
-// The same for a file's bytes; `name` stands for the file in errors.
 absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std::string& name);
 
 }  // namespace meshwright

@@ -8,9 +8,5 @@ absl::Status WritePng(const std::string& path, const ColorImage& image) {
   return WriteFileAtomically(path, EncodePng(image));
 }
 
-absl::Status WriteJpeg(const std::string& path, const ColorImage& image, int quality) {
-  return WriteFileAtomically(path, EncodeJpeg(image, quality));
-}
-
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -16,7 +16,6 @@ std::string EncodeJpeg(const ColorImage& image, int quality);
 
 // The file appears whole or not at all. Errors name the path and the system's reason.
 absl::Status WritePng(const std::string& path, const ColorImage& image);
-absl::Status WriteJpeg(const std::string& path, const ColorImage& image, int quality);
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -9,7 +9,7 @@
 
 #include "common/mesh/ply.h"
 #include "common/surface/random_surface_testing.h"
-#include "common/surface/triangulation.h"
+#include "common/surface/triangulation_testing.h"
 
 namespace meshwright {
 namespace {

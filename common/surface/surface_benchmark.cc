@@ -2,7 +2,7 @@
 
 #include "common/surface/codec.h"
 #include "common/surface/random_surface_testing.h"
-#include "common/surface/triangulation.h"
+#include "common/surface/triangulation_testing.h"
 
 namespace meshwright {
 namespace {

@@ -76,14 +76,5 @@ std::vector<std::array<int32_t, 3>> Triangulate(const SparseSurface& surface) {
   return triangles;
 }
 
-std::vector<std::array<int32_t, 3>> TriangulateLattice(const PatchLattice& surface) {
-  const SparseSurface sparse = SparseSurface::From(surface);
-  std::vector<std::array<int32_t, 3>> triangles = Triangulate(sparse);
-  for (auto& triangle : triangles) {
-    for (int32_t& corner : triangle) corner = sparse.node[static_cast<size_t>(corner)];
-  }
-  return triangles;
-}
-
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -13,8 +13,5 @@ namespace meshwright {
 // Corners are patches, counter-clockwise as seen from the camera (so that the right-hand normal points to it). The
 // diagonal of a full cell joins the pair of corners with the smaller difference in depth.
 std::vector<std::array<int32_t, 3>> Triangulate(const SparseSurface& surface);
-// The same with nodes as corners.
-std::vector<std::array<int32_t, 3>> TriangulateLattice(const PatchLattice& surface);
-
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -1,5 +1,3 @@
-#include "common/surface/triangulation.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -10,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "common/surface/random_surface_testing.h"
+#include "common/surface/triangulation_testing.h"
 
 namespace meshwright {
 namespace {

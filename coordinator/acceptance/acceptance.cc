@@ -5,9 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include <absl/strings/str_cat.h>
-
 #include "common/base/check.h"
+#include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
 #include "common/geometry/level_of_detail.h"
 
@@ -177,10 +176,8 @@ void DropDanglingLinks(PatchLattice& surface) {
 }  // namespace
 
 absl::Status AcceptanceOptions::Validate() const {
-  if (k_a < 1 || k_a > 255) return absl::InvalidArgumentError(absl::StrCat("k_a = ", k_a, ", expected 1..255"));
-  if (!(support_radius_steps > 0)) {
-    return absl::InvalidArgumentError(absl::StrCat("support_radius_steps = ", support_radius_steps, ", expected > 0"));
-  }
+  if (k_a < 1 || k_a > 255) return OutOfRange("k_a", k_a, "1..255");
+  if (!(support_radius_steps > 0)) return OutOfRange("support_radius_steps", support_radius_steps, "> 0");
   return absl::OkStatus();
 }
 
@@ -204,38 +201,6 @@ absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int
   DropDanglingLinks(result.accepted);
   result.patches_accepted = result.accepted.CountPatches();
   return result;
-}
-
-int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface) {
-  const Lattice& lattice = surface.lattice;
-  const int64_t columns = lattice.columns;
-  std::vector<bool> visited(surface.depth.size(), false);
-  std::vector<int64_t> component;  // its nodes; those from `next` on are still to be expanded
-  int64_t removed = 0;
-  for (int64_t seed = 0; seed < lattice.nodes(); ++seed) {
-    if (!surface.HasPatch(seed) || visited[static_cast<size_t>(seed)]) continue;
-    component.assign(1, seed);
-    visited[static_cast<size_t>(seed)] = true;
-    const auto visit = [&](int64_t node) {
-      if (visited[static_cast<size_t>(node)]) return;
-      visited[static_cast<size_t>(node)] = true;
-      component.push_back(node);
-    };
-    const auto linked = [&](int64_t node, uint8_t link) {
-      return (surface.links[static_cast<size_t>(node)] & link) != 0;
-    };
-    for (size_t next = 0; next < component.size(); ++next) {
-      const int64_t node = component[next];
-      if (linked(node, PatchLattice::kLinkRight)) visit(node + 1);
-      if (linked(node, PatchLattice::kLinkDown)) visit(node + columns);
-      if (node % columns > 0 && linked(node - 1, PatchLattice::kLinkRight)) visit(node - 1);
-      if (node >= columns && linked(node - columns, PatchLattice::kLinkDown)) visit(node - columns);
-    }
-    if (static_cast<int64_t>(component.size()) >= min_patches) continue;
-    removed += static_cast<int64_t>(component.size());
-    for (const int64_t node : component) ClearNode(node, surface);
-  }
-  return removed;
 }
 
 }  // namespace meshwright

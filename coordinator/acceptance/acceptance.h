@@ -46,8 +46,5 @@ using SurfaceLoader = std::function<absl::StatusOr<std::shared_ptr<const SparseS
 absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int supporters, const SurfaceLoader& load,
                                                const AcceptanceOptions& options, ThreadPool& pool);
 
-// Removes patches of connected components (by links) with fewer than `min_patches`. Gives the number removed.
-int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface);
-
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -227,40 +227,6 @@ TEST(Acceptance, PatchesAtOrBehindASupporterGetNoVote) {
   EXPECT_EQ(AcceptSurface(filtered, 2, LoaderOf(supporters), {}, pool)->patches_accepted, 0);
 }
 
-TEST(RemoveSmallComponents, RemovesWhatHangsTogetherTooLittle) {
-  std::mt19937 generator(5);
-  for (const int64_t min_patches : {0, 1, 2, 5, 40}) {
-    PatchLattice surface = RandomSurface(0, CameraAt({0, 0, 0}, 0, 40), 1, 0, generator);
-    for (uint8_t& links : surface.links) links = generator() % 3 == 0 ? links : 0;
-    const PatchLattice before = surface;
-    // Components by repeated relabelling.
-    const Lattice& lattice = before.lattice;
-    std::vector<int64_t> label(before.depth.size());
-    for (size_t i = 0; i < label.size(); ++i) label[i] = static_cast<int64_t>(i);
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (int64_t node = 0; node < lattice.nodes(); ++node) {
-        for (const auto& [bit, other] : {std::pair(PatchLattice::kLinkRight, node + 1),
-                                         std::pair(PatchLattice::kLinkDown, node + lattice.columns)}) {
-          if ((before.links[static_cast<size_t>(node)] & bit) == 0) continue;
-          int64_t& a = label[static_cast<size_t>(node)];
-          int64_t& b = label[static_cast<size_t>(other)];
-          if (a == b) continue;
-          a = b = std::min(a, b);
-          changed = true;
-        }
-      }
-    }
-    const int64_t removed = RemoveSmallComponents(min_patches, surface);
-    EXPECT_EQ(removed, before.CountPatches() - surface.CountPatches());
-    for (int64_t node = 0; node < lattice.nodes(); ++node) {
-      if (!before.HasPatch(node)) continue;
-      const auto size = std::count(label.begin(), label.end(), label[static_cast<size_t>(node)]);
-      EXPECT_EQ(surface.HasPatch(node), size >= min_patches);
-    }
-  }
-}
-
 }  // namespace
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

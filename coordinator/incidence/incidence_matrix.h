@@ -1,10 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <string>
 #include <vector>
-
-#include <absl/status/statusor.h>
 
 #include "common/base/ids.h"
 
@@ -28,11 +26,6 @@ class IncidenceMatrix {
   // O_r: the cameras whose bit is set in row r, ascending.
   const std::vector<CameraIndex>& Neighbours(CameraIndex row) const { return rows_[static_cast<size_t>(row)]; }
   int64_t CountBits() const;
-
-  // Bytes for a snapshot; all integers u32 little-endian: "MWCI", version 1, N, then per row its sum and its columns.
-  std::string Serialize() const;
-  // DataLoss says what is wrong with bytes that Serialize did not write.
-  static absl::StatusOr<IncidenceMatrix> Deserialize(const std::string& bytes);
 
   friend bool operator==(const IncidenceMatrix& a, const IncidenceMatrix& b) { return a.rows_ == b.rows_; }
 

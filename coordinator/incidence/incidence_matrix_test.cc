@@ -57,41 +57,6 @@ TEST(IncidenceMatrix, ClearingARowLeavesTheColumn) {
   EXPECT_THAT(matrix.Neighbours(2), ElementsAre(1));
 }
 
-IncidenceMatrix SomeMatrix() {
-  IncidenceMatrix matrix(6);
-  matrix.Set(0, 5);
-  matrix.Set(0, 2);
-  matrix.Set(3, 4);
-  matrix.ClearRow(3);
-  return matrix;
-}
-
-TEST(IncidenceMatrix, BytesGoRound) {
-  for (const IncidenceMatrix& matrix : {SomeMatrix(), IncidenceMatrix(0), IncidenceMatrix(3)}) {
-    const absl::StatusOr<IncidenceMatrix> read = IncidenceMatrix::Deserialize(matrix.Serialize());
-    ASSERT_TRUE(read.ok()) << read.status();
-    EXPECT_EQ(*read, matrix);
-  }
-}
-
-TEST(IncidenceMatrix, DamagedBytesAreRefusedOrWellFormed) {
-  const std::string bytes = SomeMatrix().Serialize();
-  for (size_t length = 0; length < bytes.size(); ++length) {
-    EXPECT_FALSE(IncidenceMatrix::Deserialize(bytes.substr(0, length)).ok()) << length;
-  }
-  EXPECT_FALSE(IncidenceMatrix::Deserialize(bytes + '\0').ok());
-  for (size_t i = 0; i < bytes.size(); ++i) {
-    for (int bit = 0; bit < 8; ++bit) {
-      std::string damaged = bytes;
-      damaged[i] = static_cast<char>(damaged[i] ^ (1 << bit));
-      const absl::StatusOr<IncidenceMatrix> read = IncidenceMatrix::Deserialize(damaged);
-      if (read.ok()) {
-        EXPECT_EQ(read->Serialize(), damaged);
-      }
-    }
-  }
-}
-
 }  // namespace
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include <Eigen/LU>
-#include <absl/strings/str_cat.h>
 
 #include "common/base/check.h"
+#include "common/base/out_of_range.h"
 #include "worker/photo_consistency/ncc_kernel.h"
 
 namespace meshwright {
@@ -42,16 +42,9 @@ Eigen::Vector3d NormalInCam(const Camera& reference, double x0, double y0, const
 }
 
 absl::Status PatchScorer::Options::Validate() const {
-  if (window_radius < 1 || window_radius > 7) {
-    return absl::InvalidArgumentError(absl::StrCat("scoring.window_radius is ", window_radius, " px, expected 1..7"));
-  }
-  if (!(similarity_scale > 0)) {
-    return absl::InvalidArgumentError(absl::StrCat("scoring.similarity_scale is ", similarity_scale, ", expected > 0"));
-  }
-  if (!(min_texture_sigma >= 0)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("scoring.min_texture_sigma is ", min_texture_sigma, ", expected >= 0"));
-  }
+  if (window_radius < 1 || window_radius > 7) return OutOfRange("scoring.window_radius", window_radius, "1..7 px");
+  if (!(similarity_scale > 0)) return OutOfRange("scoring.similarity_scale", similarity_scale, "> 0");
+  if (!(min_texture_sigma >= 0)) return OutOfRange("scoring.min_texture_sigma", min_texture_sigma, ">= 0");
   return absl::OkStatus();
 }
 
@@ -59,7 +52,6 @@ absl::Status PatchScorer::Options::Validate() const {
 struct PatchScorer::Target {
   Eigen::Matrix3f a;
   Eigen::Vector3f b;
-  Eigen::Vector3d center_in_reference;  // scene units
 };
 
 PatchScorer::PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options,
@@ -86,8 +78,7 @@ PatchScorer::PatchScorer(ScoredView reference, std::vector<ScoredView> targets, 
     k_target(0, 2) -= 0.5;
     k_target(1, 2) -= 0.5;
     geometry_.push_back({(k_target * target_from_reference.rotation * reference_.camera.K().inverse()).cast<float>(),
-                         (k_target * target_from_reference.translation).cast<float>(),
-                         Inverse(target_from_reference).translation});
+                         (k_target * target_from_reference.translation).cast<float>()});
   }
 }
 
@@ -251,13 +242,6 @@ float PatchScorer::MeanScore(const Window& window, int x, int y, const PatchPlan
     sum += ncc;
   }
   return sigma != 0 ? sum / static_cast<float>(std::popcount(sigma)) : kNoScore;
-}
-
-double PatchScorer::ApicalAngle(int x, int y, float inverse_depth, int target) const {
-  const Eigen::Vector3d x_in_cam = reference_.camera.RayInCam(x + 0.5, y + 0.5) / inverse_depth;
-  const Eigen::Vector3d to_target = geometry_[static_cast<size_t>(target)].center_in_reference - x_in_cam;
-  const double cosine = -x_in_cam.dot(to_target) / (x_in_cam.norm() * to_target.norm());
-  return std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
 float PatchScorer::PixelsPerInverseDepth(int x, int y, float inverse_depth, int target) const {

@@ -87,9 +87,6 @@ class PatchScorer {
   // any of them has none.
   float MeanScore(const Window& window, int x, int y, const PatchPlane& plane, uint32_t sigma) const;
 
-  // Angle at the patch between the rays to the reference and to target i, radians.
-  double ApicalAngle(int x, int y, float inverse_depth, int target) const;
-
   // How far the image of the pixel's ray point in target i moves per unit of inverse depth, px times scene units.
   float PixelsPerInverseDepth(int x, int y, float inverse_depth, int target) const;
 

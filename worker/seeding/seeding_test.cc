@@ -165,6 +165,13 @@ Errors Compare(const SeedingResult& result, const std::vector<TexturedPlane>& pl
   return errors;
 }
 
+// Angle at `x_in_world` between the rays to both cameras, radians.
+double ApicalAngle(const Eigen::Vector3d& x_in_world, const Camera& a, const Camera& b) {
+  const Eigen::Vector3d to_a = (a.center_in_world() - x_in_world).normalized();
+  const Eigen::Vector3d to_b = (b.center_in_world() - x_in_world).normalized();
+  return std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b));
+}
+
 void ExpectWellFormed(const SeedingResult& result, const PatchScorer& scorer, const Lattice& lattice) {
   std::vector<int64_t> per_target(static_cast<size_t>(scorer.targets()), 0);
   for (size_t i = 0; i < result.seeds.size(); ++i) {
@@ -184,7 +191,8 @@ void ExpectWellFormed(const SeedingResult& result, const PatchScorer& scorer, co
     for (int t = 0; t < scorer.targets(); ++t) {
       if ((seed.sigma >> t & 1U) == 0) continue;
       ++per_target[static_cast<size_t>(t)];
-      EXPECT_GT(scorer.ApicalAngle(x, y, seed.plane.w, t), 2.99 * kDegree);
+      const Eigen::Vector3d x_in_world = scorer.reference().BackProject(x + 0.5, y + 0.5, 1.0 / seed.plane.w);
+      EXPECT_GT(ApicalAngle(x_in_world, scorer.reference(), scorer.target(t).camera), 2.99 * kDegree);
     }
   }
   EXPECT_EQ(per_target, result.seeds_per_target);

@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/surface/triangulation.h"
+#include "common/surface/triangulation_testing.h"
 
 namespace meshwright {
 namespace {
