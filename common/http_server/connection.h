@@ -15,6 +15,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 
+#include "common/base/clock.h"
 #include "common/base/mutex.h"
 #include "common/http_server/fair_worker_pool.h"
 #include "common/http_server/http_message.h"
@@ -60,26 +61,25 @@ class Connection : public std::enable_shared_from_this<Connection> {
   using Step = void (Connection::*)();
   using ErrorCode = boost::beast::error_code;
 
-  // Reading a head.
+  // Reading a head: connection.cc.
   void NextRequest();
   void ReadHead();
   void TakeHead(size_t bytes);
   std::string CallerOf(const HttpRequest& request) const;
 
-  // The handler, and the request's body.
+  // The handler, and the request's body: connection_body.cc.
   void Handled();
-  void SendContinue();
   void BeginBody();
   void ReadBody();
+  void ReadIntoBody(Step then);
   bool DecodeBody();
   bool BodyHasEnded() const;
-  int64_t BodyBytesLeftAtLeast() const;
   void TakePiece();
   void PieceTaken();
   void DropBody();
   void EndBody();
 
-  // The answer.
+  // The answer: connection_response.cc.
   void Fault(const HttpFault& fault);
   void Respond();
   std::string ResponseHead();
@@ -91,16 +91,15 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void EventsWritten();
   void AfterResponse();
   void Linger();
-  void Reset();
-  void Close();
 
   // What the steps are made of. Each calls `then` on the strand, unless the client is gone or too slow.
   void Read(size_t most, Step then);
-  void ReadIntoBody(Step then);
   void Write(std::string text, Step then);
   void WriteRest(Step then);
   void InWorker(std::function<void()> work, Step then);
   void Expire(absl::Duration after);
+  void Reset();
+  void Close();
 
   template <typename Buffer, typename Handler>
   void ReadSome(const Buffer& buffer, Handler handler);
@@ -125,7 +124,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   int64_t content_left_ = 0;      // of Content-Length, not yet in body_
   int64_t received_ = 0;
   int64_t dropped_ = 0;
-  absl::Time body_began_;
+  Stopwatch body_time_;    // since the body began
   bool dropping_ = false;  // what comes is not wanted any more
   bool more_wanted_ = true;
 
@@ -137,6 +136,15 @@ class Connection : public std::enable_shared_from_this<Connection> {
   char watched_[512];
   size_t drained_ = 0;
 };
+
+template <typename Buffer, typename Handler>
+void Connection::ReadSome(const Buffer& buffer, Handler handler) {
+  if (tls_) {
+    tls_->async_read_some(buffer, std::move(handler));
+  } else {
+    tcp_.async_read_some(buffer, std::move(handler));
+  }
+}
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

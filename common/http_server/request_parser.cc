@@ -50,12 +50,18 @@ std::optional<HttpFault> CheckContentLength(const HttpHeaders& headers, int64_t*
                    absl::StrCat("Content-Length is \"", text.substr(0, kQuoted), "\", expected a whole number")};
 }
 
+// Where the body ends.
+struct Framing {
+  bool is_chunked = false;
+  int64_t length = 0;  // of a body that is not
+};
+
 // What the header fields say, whatever Beast makes of them.
-std::optional<HttpFault> CheckFraming(const HttpHeaders& headers, bool http_1_0, bool* chunked, int64_t* length) {
-  if (const auto fault = CheckContentLength(headers, length)) return fault;
+std::optional<HttpFault> CheckFraming(const HttpHeaders& headers, bool http_1_0, Framing& framing) {
+  if (const auto fault = CheckContentLength(headers, &framing.length)) return fault;
   const std::string encoding = headers.Get("Transfer-Encoding");
-  *chunked = headers.Has("Transfer-Encoding");
-  if (*chunked) {
+  framing.is_chunked = headers.Has("Transfer-Encoding");
+  if (framing.is_chunked) {
     if (headers.Has("Content-Length")) {
       return HttpFault{400, "Transfer-Encoding",
                        "Transfer-Encoding and Content-Length are given, expected one of them"};
@@ -105,9 +111,11 @@ std::optional<HttpFault> RequestParser::ParseHead(const std::string& head, const
   put(boost::asio::buffer(head), error);
   request_ = nullptr;
   // What is wrong with the fields that frame the body is better said here than by Beast.
-  if (auto fault = CheckFraming(request.headers, version_ == 10, &chunked_body_, &content_bytes_)) {
-    if (!request.method.empty()) return fault;
-  }
+  Framing framing;
+  auto fault = CheckFraming(request.headers, version_ == 10, framing);
+  if (fault && !request.method.empty()) return fault;
+  chunked_body_ = framing.is_chunked;
+  content_bytes_ = framing.length;
   if (error == http::error::bad_content_length || error == http::error::multiple_content_length) {
     return HttpFault{400, "Content-Length", "Content-Length is expected once, a whole number"};
   }
