@@ -6,12 +6,12 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <absl/time/clock.h>
 #include <absl/time/time.h>
 
 #include "cli/commands.h"
 #include "cli/mesh_output.h"
 #include "cli/service_arguments.h"
+#include "common/base/clock.h"
 #include "common/base/files.h"
 #include "common/mesh/formats/mesh_format.h"
 
@@ -87,7 +87,8 @@ int ShowWorkers(const Arguments& arguments) {
   if (!response.ok()) return FailCall(response.status(), arguments.service);
   Json all = Json::array();
   for (const v1::Worker& worker : response->workers()) {
-    const double silent = absl::ToDoubleSeconds(absl::Now() - absl::FromUnixSeconds(worker.last_seen().seconds()));
+    const double silent =
+        absl::ToDoubleSeconds(SystemClock().Now() - absl::FromUnixSeconds(worker.last_seen().seconds()));
     all.push_back({{"id", worker.id()},
                    {"cores", worker.cores()},
                    {"memory_bytes", worker.memory_bytes()},

@@ -44,7 +44,9 @@ endfunction()
 set(public_headers
   common/base/files.h
   common/base/ids.h
+  common/geometry/camera.h
   common/geometry/lens.h
+  common/geometry/oriented_box.h
   common/geometry/rigid3.h
   common/mesh/ply.h
   common/mesh/triangle_mesh.h

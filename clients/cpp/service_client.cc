@@ -1,7 +1,6 @@
 #include "clients/cpp/service_client.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <utility>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "meshwright/v1/access.grpc.pb.h"
 #include "meshwright/v1/reconstruction.grpc.pb.h"
 
+#include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
@@ -20,7 +20,7 @@ namespace meshwright {
 namespace {
 
 constexpr size_t kChunkBytes = size_t{256} << 10;
-constexpr std::chrono::seconds kCallDeadline(60);
+constexpr absl::Duration kCallDeadline = absl::Seconds(60);
 constexpr int kMaxMessageBytes = 64 << 20;
 constexpr int kMaxReconnectBackoffMs = 2000;
 
@@ -209,7 +209,7 @@ class RealServiceClient final : public ServiceClient {
                       const Request& request, Response& response) {
     grpc::ClientContext context;
     ShowKey(context);
-    context.set_deadline(std::chrono::system_clock::now() + kCallDeadline);
+    context.set_deadline(absl::ToChronoTime(SystemClock().Now() + kCallDeadline));
     return FromGrpc((stub.*method)(&context, request, &response));
   }
   template <typename Method, typename Request, typename Response>

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -188,15 +189,15 @@ void RemovePartialFiles(const std::string& path) {
   }
 }
 
-void RemoveStalePartialFiles(const std::string& folder, absl::Duration age) {
+void RemoveStalePartialFiles(const std::string& folder, absl::Time oldest) {
   namespace fs = std::filesystem;
-  const auto oldest = fs::file_time_type::clock::now() - absl::ToChronoSeconds(age);
+  const auto oldest_file = std::chrono::file_clock::from_sys(absl::ToChronoTime(oldest));
   std::error_code error;
   for (auto at = fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied, error);
        !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
     std::error_code of_file;
     if (at->path().filename().string().find(kPartial) == std::string::npos) continue;
-    if (!at->is_regular_file(of_file) || at->last_write_time(of_file) > oldest || of_file) continue;
+    if (!at->is_regular_file(of_file) || at->last_write_time(of_file) > oldest_file || of_file) continue;
     fs::remove(at->path(), of_file);
   }
 }

@@ -51,9 +51,9 @@ std::string PartialPath(const std::string& path);
 // Removes what processes that died while they wrote `path` left beside it. Errors are ignored: it is a matter of space.
 void RemovePartialFiles(const std::string& path);
 
-// Removes what AtomicFiles of processes that died left in `folder` and below, when nothing was written to it for `age`.
-// Errors are ignored: it is a matter of space only.
-void RemoveStalePartialFiles(const std::string& folder, absl::Duration age);
+// Removes what AtomicFiles of processes that died left in `folder` and below, when nothing was written to it since
+// `oldest`. Errors are ignored: it is a matter of space only.
+void RemoveStalePartialFiles(const std::string& folder, absl::Time oldest);
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include "common/base/clock.h"
+
 namespace meshwright {
 namespace {
 
@@ -93,7 +95,7 @@ TEST_F(FilesTest, OnlyStalePartialFilesAreRemoved) {
   const auto two_days_ago = fs::file_time_type::clock::now() - std::chrono::hours(48);
   fs::last_write_time(stale, two_days_ago);
   fs::last_write_time(whole, two_days_ago);
-  RemoveStalePartialFiles(folder_.string(), absl::Hours(24));
+  RemoveStalePartialFiles(folder_.string(), SystemClock().Now() - absl::Hours(24));
   EXPECT_FALSE(fs::exists(stale));
   EXPECT_TRUE(fs::exists(fresh));
   EXPECT_TRUE(fs::exists(whole));

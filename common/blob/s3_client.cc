@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <random>
 #include <utility>
 
 #include <absl/strings/ascii.h>
@@ -10,7 +9,9 @@
 #include <absl/time/clock.h>
 #include <curl/curl.h>
 
+#include "common/base/backoff.h"
 #include "common/base/check.h"
+#include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/base/status_macros.h"
 
@@ -18,8 +19,7 @@ namespace meshwright {
 namespace {
 
 constexpr int64_t kSmallestPartBytes = int64_t{5} << 20;
-constexpr absl::Duration kFirstPause = absl::Milliseconds(100);
-constexpr absl::Duration kLongestPause = absl::Seconds(5);
+constexpr BackoffOptions kBackoff = {.first = absl::Milliseconds(100), .longest = absl::Seconds(5)};
 constexpr long kConnectTimeoutSeconds = 10;
 // A transfer slower than this many bytes a second for so long is given up.
 constexpr long kLowSpeedBytesPerSecond = 1000;
@@ -52,11 +52,6 @@ size_t ReadHeader(const char* data, size_t size, size_t count, void* etag) {
 bool IsPermanent(CURLcode code) {
   return code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL || code == CURLE_PEER_FAILED_VERIFICATION ||
          code == CURLE_OUT_OF_MEMORY || code == CURLE_BAD_FUNCTION_ARGUMENT;
-}
-
-absl::Duration Jittered(absl::Duration pause) {
-  thread_local std::minstd_rand random{std::random_device{}()};
-  return pause * std::uniform_real_distribution<double>(0.5, 1.0)(random);
 }
 
 }  // namespace
@@ -139,16 +134,16 @@ std::string S3Client::UrlOf(const std::string& key) const {
 
 absl::StatusOr<S3Response> S3Client::Send(const S3Request& request) {
   void* const handle = TakeHandle();
-  const absl::Time deadline = absl::Now() + options_.retry_deadline;
-  absl::Duration pause = kFirstPause;
+  const Stopwatch stopwatch;
+  Backoff backoff(kBackoff);
   while (true) {
     Attempt attempt = SendOnce(handle, request);
-    if (!attempt.may_retry || absl::Now() + pause >= deadline) {
+    const absl::Duration delay = backoff.Next();
+    if (!attempt.may_retry || stopwatch.Elapsed() + delay >= options_.retry_deadline) {
       ReturnHandle(handle);
       return std::move(attempt.response);
     }
-    absl::SleepFor(Jittered(pause));
-    pause = std::min(2 * pause, kLongestPause);
+    absl::SleepFor(delay);
   }
 }
 

@@ -14,6 +14,7 @@
 #include <boost/asio/strand.hpp>
 #include <sys/resource.h>
 
+#include "common/base/clock.h"
 #include "common/base/host_port.h"
 #include "common/base/status_macros.h"
 #include "common/http_server/connection.h"
@@ -87,9 +88,10 @@ class BeastHttpServer final : public HttpServer {
       acceptor_.close(ignored);
       accept_timer_.cancel();
     });
-    const absl::Time until = absl::Now() + grace;
+    const Stopwatch since_stop;
     // Those that were being accepted are told in the next round.
-    while (StopConnections() > 0 && absl::Now() < until) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    while (StopConnections() > 0 && since_stop.Elapsed() < grace)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
     io_.stop();
     for (std::thread& thread : threads_) thread.join();
     core_.pool.Shutdown();

@@ -1,7 +1,6 @@
 #include "common/http_server/http_testing.h"
 
 #include <cerrno>
-#include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <memory>
@@ -17,13 +16,10 @@
 #include <unistd.h>
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 
 namespace meshwright {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point begun) { return std::chrono::duration<double>(Clock::now() - begun).count(); }
 
 sockaddr_in AddressOf(const std::string& host, int port) {
   sockaddr_in address = {};
@@ -68,10 +64,10 @@ bool RawClient::Send(const std::string& bytes) const {
 }
 
 std::string RawClient::Read(double seconds, const std::string& until, size_t count) const {
-  const Clock::time_point begun = Clock::now();
+  const Stopwatch stopwatch;
   std::string text;
   while (text.size() < count && (until.empty() || text.find(until) == std::string::npos)) {
-    const double left = seconds - SecondsSince(begun);
+    const double left = seconds - stopwatch.Seconds();
     pollfd event = {.fd = socket_, .events = POLLIN, .revents = 0};
     if (left <= 0 || ::poll(&event, 1, static_cast<int>(left * 1000) + 1) <= 0) break;
     char piece[65536];
@@ -83,8 +79,8 @@ std::string RawClient::Read(double seconds, const std::string& until, size_t cou
 }
 
 bool RawClient::IsClosedWithin(double seconds) const {
-  const Clock::time_point begun = Clock::now();
-  while (SecondsSince(begun) < seconds) {
+  const Stopwatch stopwatch;
+  while (stopwatch.Seconds() < seconds) {
     pollfd event = {.fd = socket_, .events = POLLIN, .revents = 0};
     if (::poll(&event, 1, 20) <= 0) continue;
     char piece[65536];
@@ -99,11 +95,11 @@ void RawClient::ShrinkReceiveBuffer() const {
 }
 
 double SecondsOf(int port, const std::string& path, const std::string& from) {
-  const Clock::time_point begun = Clock::now();
+  const Stopwatch stopwatch;
   const RawClient client(port, from);
   client.Send("GET " + path + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
   const std::string answer = client.Read(30);
-  return answer.rfind("HTTP/1.1 200", 0) == 0 ? SecondsSince(begun) : 1e9;
+  return answer.rfind("HTTP/1.1 200", 0) == 0 ? stopwatch.Seconds() : 1e9;
 }
 
 size_t CountAnswers(const std::string& text) {

@@ -48,15 +48,13 @@ Logger::Logger(Format format, const Clock& clock, Sink sink)
       }) {}
 
 Logger Logger::ToStderr() {
-  static const RealClock clock;
   const Format format = ::isatty(STDERR_FILENO) != 0 ? Format::kText : Format::kJson;
   // One write a line: several processes may share the stream.
-  return {format, clock, [](const std::string& line) { std::fputs((line + "\n").c_str(), stderr); }};
+  return {format, SystemClock(), [](const std::string& line) { std::fputs((line + "\n").c_str(), stderr); }};
 }
 
 Logger Logger::Nowhere() {
-  static const RealClock clock;
-  return {Format::kJson, clock, [](const std::string&) {}};
+  return {Format::kJson, SystemClock(), [](const std::string&) {}};
 }
 
 Logger Logger::With(const LogFields& fields) const {

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include <absl/time/clock.h>
+#include "common/base/clock.h"
 
 namespace meshwright {
 namespace {
@@ -24,57 +24,57 @@ MeasuredBlobStore::MeasuredBlobStore(BlobStore& blobs, Metrics& metrics)
       written_bytes_(metrics.Counter("meshwright_blob_written_bytes_total", "Bytes put into the blob store.")) {}
 
 absl::StatusOr<std::string> MeasuredBlobStore::Put(const std::string& bytes) {
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   absl::StatusOr<std::string> digest = blobs_.Put(bytes);
-  calls_.Record("put", absl::Now() - begun, digest.status());
+  calls_.Record("put", stopwatch.Elapsed(), digest.status());
   if (digest.ok()) written_bytes_.Increment(static_cast<double>(bytes.size()));
   return digest;
 }
 
 absl::StatusOr<std::string> MeasuredBlobStore::Get(const std::string& digest) {
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   absl::StatusOr<std::string> bytes = blobs_.Get(digest);
-  calls_.Record("get", absl::Now() - begun, bytes.status());
+  calls_.Record("get", stopwatch.Elapsed(), bytes.status());
   if (bytes.ok()) read_bytes_.Increment(static_cast<double>(bytes->size()));
   return bytes;
 }
 
 absl::StatusOr<std::string> MeasuredBlobStore::PutFile(const std::string& path) {
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   absl::StatusOr<std::string> digest = blobs_.PutFile(path);
-  calls_.Record("put", absl::Now() - begun, digest.status());
+  calls_.Record("put", stopwatch.Elapsed(), digest.status());
   if (digest.ok()) written_bytes_.Increment(SizeOf(path));
   return digest;
 }
 
 absl::Status MeasuredBlobStore::GetFile(const std::string& digest, const std::string& path) {
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   absl::Status status = blobs_.GetFile(digest, path);
-  calls_.Record("get", absl::Now() - begun, status);
+  calls_.Record("get", stopwatch.Elapsed(), status);
   if (status.ok()) read_bytes_.Increment(SizeOf(path));
   return status;
 }
 
 absl::Status MeasuredBlobStore::Adopt(const std::string& path, const std::string& digest) {
   const double bytes = SizeOf(path);
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   absl::Status status = blobs_.Adopt(path, digest);
-  calls_.Record("put", absl::Now() - begun, status);
+  calls_.Record("put", stopwatch.Elapsed(), status);
   if (status.ok()) written_bytes_.Increment(bytes);
   return status;
 }
 
 absl::StatusOr<bool> MeasuredBlobStore::Has(const std::string& digest) {
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   const absl::StatusOr<bool> has = blobs_.Has(digest);
-  calls_.Record("has", absl::Now() - begun, has.status());
+  calls_.Record("has", stopwatch.Elapsed(), has.status());
   return has;
 }
 
 absl::Status MeasuredBlobStore::Delete(const std::string& digest) {
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   absl::Status status = blobs_.Delete(digest);
-  calls_.Record("delete", absl::Now() - begun, status);
+  calls_.Record("delete", stopwatch.Elapsed(), status);
   return status;
 }
 

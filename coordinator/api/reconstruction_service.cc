@@ -187,7 +187,7 @@ absl::Status ReconstructionService::TakeUp(const ConductedState& state, absl::Ti
 }
 
 bool ReconstructionService::IsAbandoned(const ConductedState& state) {
-  const absl::Time now = MonotonicNow();
+  const absl::Duration now = SystemClock().Uptime();
   SeenLease& seen = others_[state.id];
   if (seen.epoch != state.lease.epoch || seen.expires_at != state.lease.expires_at) {
     seen = {.epoch = state.lease.epoch, .expires_at = state.lease.expires_at, .since = now};

@@ -125,7 +125,7 @@ class ReconstructionService {
   struct SeenLease {
     int64_t epoch = 0;
     absl::Time expires_at;
-    absl::Time since;  // monotonic
+    absl::Duration since;  // by Clock::Uptime()
   };
   std::map<std::string, SeenLease> others_;
   std::thread overseer_;

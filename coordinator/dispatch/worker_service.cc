@@ -104,8 +104,8 @@ v1::Attempt RunningAttempt(const OpenJob& job) {
 }  // namespace
 
 WorkerService::WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store,
-                             const Clock& monotonic)
-    : lease_(lease), retry_(retry), store_(store), monotonic_(monotonic), watch_(lease) {
+                             const Clock& clock)
+    : lease_(lease), retry_(retry), store_(store), clock_(clock), watch_(lease) {
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -265,7 +265,7 @@ absl::Status WorkerService::MakePass(std::list<Call>& calls) {
   MW_ASSIGN_OR_RETURN(std::vector<OpenJob> open, store_.ListOpenJobs());
   MW_RETURN_IF_ERROR(LookAtWorkers(now));
   last_pass_ = now;
-  watch_.Observe(open, monotonic_.Now());
+  watch_.Observe(open, clock_.Uptime());
 
   SchedulingPass pass(lease_, retry_, watch_, std::move(open), now, MemoryStepsOf(store_));
   for (Call& call : calls) {
@@ -278,7 +278,7 @@ absl::Status WorkerService::MakePass(std::list<Call>& calls) {
   }
   const std::vector<WorkerRecord> heartbeats = Heartbeats(calls, now);
   MW_ASSIGN_OR_RETURN(AppliedPass applied, ApplyPass(pass, heartbeats, store_, now));
-  watch_.Observe(pass.jobs(), monotonic_.Now());
+  watch_.Observe(pass.jobs(), clock_.Uptime());
   for (const WorkerRecord& worker : heartbeats) written_workers_[worker.id] = worker;
   for (AppliedPass::Claim& claim : applied.claims) {
     claimed_[{claim.reconstruction, claim.job.sequence}] = std::move(claim.job);

@@ -33,9 +33,9 @@ class WorkerService {
  public:
   using Answer = std::function<void(absl::StatusOr<v1::SynchronizeResponse>)>;
 
-  // `store` and `monotonic`, by which leases are timed, outlive it.
+  // `store` and `clock`, by whose uptime leases are timed, outlive it.
   WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store,
-                const Clock& monotonic = kMonotonicClock);
+                const Clock& clock = SystemClock());
   ~WorkerService();
 
   // Answers up to request.wait_timeout_seconds later, while there is nothing that the worker does not know; from
@@ -96,7 +96,7 @@ class WorkerService {
   const LeaseOptions lease_;
   const RetryOptions retry_;
   JobStore& store_;
-  const Clock& monotonic_;
+  const Clock& clock_;
 
   // Of the thread alone.
   LeaseWatch watch_;

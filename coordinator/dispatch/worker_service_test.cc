@@ -29,23 +29,6 @@ v1::SynchronizeRequest Request(const std::string& worker) {
   return request;
 }
 
-// A clock that threads may read while the test moves it.
-class SharedClock : public Clock {
- public:
-  absl::Time Now() const override {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return now_;
-  }
-  void Advance(absl::Duration duration) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    now_ += duration;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  absl::Time now_ = absl::FromUnixSeconds(1'000'000'000);
-};
-
 v1::HeldJob Held(const v1::CameraJob& job) {
   v1::HeldJob held;
   *held.mutable_key() = job.key();
@@ -121,8 +104,8 @@ class WorkerServiceTest : public testing::Test {
   static inline const std::string kDigest = std::string(64, 'e');
   static inline const LeaseOptions kLease = {.lease = absl::Seconds(30), .job_time_limit = absl::Hours(1)};
   std::string folder_;
-  SharedClock clock_;      // the store's
-  SharedClock monotonic_;  // the coordinators'
+  ManualClock clock_;      // the store's
+  ManualClock monotonic_;  // the coordinators'
   std::unique_ptr<JobStore> store_;
   int64_t epoch_ = 0;  // of the lease of the reconstruction's conductor
   std::unique_ptr<WorkerService> service_;

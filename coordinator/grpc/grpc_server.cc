@@ -8,7 +8,6 @@
 
 #include <absl/cleanup/cleanup.h>
 #include <absl/strings/str_cat.h>
-#include <absl/time/clock.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/resource_quota.h>
@@ -18,6 +17,7 @@
 #include "meshwright/v1/reconstruction.grpc.pb.h"
 #include "meshwright/v1/worker.grpc.pb.h"
 
+#include "common/base/clock.h"
 #include "common/base/mutex.h"
 #include "common/base/status_macros.h"
 #include "common/blob/staged_blob.h"
@@ -391,7 +391,7 @@ class RealGrpcServer final : public GrpcServer {
     if (server_ == nullptr) return;
     workers_.Shutdown();
     reconstructions_.Shutdown();
-    server_->Shutdown(absl::ToChronoTime(absl::Now() + deadline));
+    server_->Shutdown(absl::ToChronoTime(SystemClock().Now() + deadline));
     server_->Wait();
     server_.reset();
   }

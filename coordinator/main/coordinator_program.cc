@@ -96,7 +96,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
     fs::permissions(data, fs::perms::owner_all, error);
     MW_ASSIGN_OR_RETURN(FolderLock lock, FolderLock::Acquire(data));
     data_lock_ = std::make_unique<FolderLock>(std::move(lock));
-    RemoveStalePartialFiles(data, kStalePartialFile);
+    RemoveStalePartialFiles(data, clock_.Now() - kStalePartialFile);
     const std::string where =
         settings_.store.empty() ? absl::StrCat("sqlite:", data, "/state.sqlite") : settings_.store;
     MW_ASSIGN_OR_RETURN(store_, OpenJobStore(where, [this](std::unique_ptr<SqlDatabase> database) {

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include <absl/strings/str_cat.h>
-#include <absl/time/clock.h>
 #include <absl/time/time.h>
 
+#include "common/base/clock.h"
 #include "common/base/status_macros.h"
 #include "common/json/parse_json.h"
 #include "common/scene/scene.h"
@@ -141,7 +141,7 @@ absl::StatusOr<Json> LogJson(const ReconstructionService& service, const std::st
   MW_ASSIGN_OR_RETURN(const v1::ListAttemptsResponse attempts, LastAttempts(service, id));
   std::vector<LogEntry> entries;
   entries.push_back({TimeOf(reconstruction.create_time()), kInfo, "created"});
-  const absl::Time now = reconstruction.has_finish_time() ? TimeOf(reconstruction.finish_time()) : absl::Now();
+  const absl::Time now = reconstruction.has_finish_time() ? TimeOf(reconstruction.finish_time()) : SystemClock().Now();
   std::map<int32_t, absl::Time> last_end;
   for (const v1::Attempt& attempt : attempts.attempts()) {
     if (!attempt.has_end_time()) continue;

@@ -5,9 +5,9 @@
 
 namespace meshwright {
 
-void LeaseWatch::Observe(const std::vector<OpenJob>& open, absl::Time monotonic_now) {
-  const bool after_pause = monotonic_now - now_ > lease_.lease / 2;
-  now_ = monotonic_now;
+void LeaseWatch::Observe(const std::vector<OpenJob>& open, absl::Duration uptime) {
+  const bool after_pause = uptime - now_ > lease_.lease / 2;
+  now_ = uptime;
   std::map<JobKey, Seen> leases;
   for (const OpenJob& job : open) {
     if (job.lease_worker.empty()) continue;

@@ -11,7 +11,7 @@
 
 namespace meshwright {
 
-// How long leases of camera jobs have stood in the store as they are, by this process's monotonic clock. Times in the
+// How long leases of camera jobs have stood in the store as they are, by the uptime of this process's clock. Times in the
 // store are of a clock that may jump, by an hour at that: what they say is never held against a worker.
 class LeaseWatch {
  public:
@@ -19,7 +19,7 @@ class LeaseWatch {
 
   // What the store says now. Who is not looked at for more than half a lease gets half a lease more: its worker could
   // not be heard.
-  void Observe(const std::vector<OpenJob>& open, absl::Time monotonic_now);
+  void Observe(const std::vector<OpenJob>& open, absl::Duration uptime);
   // Its worker has not renewed it for the length of a lease.
   bool HasRunOut(const OpenJob& job) const;
   bool TakesTooLong(const OpenJob& job) const;
@@ -27,12 +27,12 @@ class LeaseWatch {
  private:
   struct Seen {
     absl::Time expires_at;       // as stored
-    absl::Time unchanged_since;  // monotonic, as the next
-    absl::Time first;
+    absl::Duration unchanged_since;  // uptime, as the next
+    absl::Duration first;
   };
 
   const LeaseOptions lease_;
-  absl::Time now_ = absl::InfinitePast();
+  absl::Duration now_ = -absl::InfiniteDuration();
   std::map<JobKey, Seen> leases_;
 };
 

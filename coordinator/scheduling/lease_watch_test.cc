@@ -13,7 +13,7 @@ OpenJob Leased(absl::Time expires_at) {
 
 TEST(LeaseWatchTest, ALeaseRunsOutWhenItStandsUnchangedForItsLength) {
   LeaseWatch watch(kLease);
-  absl::Time now = absl::UnixEpoch();
+  absl::Duration now = absl::ZeroDuration();
   const OpenJob job = Leased(absl::FromUnixSeconds(77));  // whatever the store's clock says
   EXPECT_FALSE(watch.HasRunOut(job));
   for (int seconds = 0; seconds < 30; seconds += 10) {
@@ -31,8 +31,8 @@ TEST(LeaseWatchTest, ALeaseRunsOutWhenItStandsUnchangedForItsLength) {
 
 TEST(LeaseWatchTest, WhoWasNotLookedAtWasNotSilent) {
   LeaseWatch watch(kLease);
-  absl::Time now = absl::UnixEpoch();
-  const OpenJob job = Leased(now);
+  absl::Duration now = absl::ZeroDuration();
+  const OpenJob job = Leased(absl::UnixEpoch() + now);
   watch.Observe({job}, now);
   now += absl::Hours(3);
   watch.Observe({job}, now);
@@ -47,15 +47,15 @@ TEST(LeaseWatchTest, WhoWasNotLookedAtWasNotSilent) {
 
 TEST(LeaseWatchTest, AJobTakesTooLongHoweverOftenItsLeaseIsRenewed) {
   LeaseWatch watch(kLease);
-  absl::Time now = absl::UnixEpoch();
+  absl::Duration now = absl::ZeroDuration();
   for (int seconds = 0; seconds <= 100; seconds += 10) {
-    const OpenJob job = Leased(now + absl::Seconds(30));
+    const OpenJob job = Leased(absl::UnixEpoch() + now + absl::Seconds(30));
     watch.Observe({job}, now);
     EXPECT_FALSE(watch.HasRunOut(job));
     EXPECT_FALSE(watch.TakesTooLong(job)) << seconds;
     now += absl::Seconds(10);
   }
-  OpenJob job = Leased(now);
+  OpenJob job = Leased(absl::UnixEpoch() + now);
   watch.Observe({job}, now);
   EXPECT_TRUE(watch.TakesTooLong(job));
   // Handed out again it begins anew.

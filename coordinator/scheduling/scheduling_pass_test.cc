@@ -58,8 +58,8 @@ SchedulingPass Plan(std::vector<OpenJob> jobs, absl::Time now = kNow, const Leas
 // Has seen the jobs unchanged for so long.
 LeaseWatch Watched(const std::vector<OpenJob>& jobs, absl::Duration age) {
   LeaseWatch watch(kLease);
-  absl::Time now = absl::UnixEpoch();
-  for (const absl::Time end = now + age; now < end; now += absl::Seconds(1)) watch.Observe(jobs, now);
+  absl::Duration now = absl::ZeroDuration();
+  for (const absl::Duration end = now + age; now < end; now += absl::Seconds(1)) watch.Observe(jobs, now);
   watch.Observe(jobs, now);
   return watch;
 }
@@ -176,7 +176,7 @@ TEST(SchedulingPassTest, AWorkerThatHangsAndIsAliveLosesTheJobToo) {
   LeaseWatch watch(kLease);
   for (int seconds = 0; seconds <= 101; ++seconds) {
     job.lease_expires_at += absl::Seconds(1);
-    watch.Observe({job}, absl::FromUnixSeconds(seconds));
+    watch.Observe({job}, absl::Seconds(seconds));
   }
   SchedulingPass plan = Plan({job}, kNow, watch);
   plan.ApplyReport(report);

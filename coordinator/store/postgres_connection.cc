@@ -144,9 +144,9 @@ PostgresError PostgresConnection::ResultError(const pg_result* result) {
   return Classify(code, absl::StrCat(description_, ": ", primary == nullptr ? "unknown error" : primary));
 }
 
-bool PostgresConnection::WaitForInput(absl::Time deadline) {
+bool PostgresConnection::WaitForInput(absl::Duration deadline) {
   while (PQisBusy(connection_) != 0) {
-    const absl::Duration left = deadline - MonotonicNow();
+    const absl::Duration left = deadline - SystemClock().Uptime();
     if (left <= absl::ZeroDuration()) return false;
     pollfd socket = {.fd = PQsocket(connection_), .events = POLLIN, .revents = 0};
     const int ready = ::poll(&socket, 1, static_cast<int>(absl::ToInt64Milliseconds(left)) + 1);
@@ -156,7 +156,7 @@ bool PostgresConnection::WaitForInput(absl::Time deadline) {
   return true;
 }
 
-PostgresError PostgresConnection::Receive(absl::Time deadline, SqlResult* result) {
+PostgresError PostgresConnection::Receive(absl::Duration deadline, SqlResult* result) {
   PostgresError error;
   while (true) {
     if (!WaitForInput(deadline)) return ConnectionError("no answer");
@@ -183,13 +183,13 @@ PostgresError PostgresConnection::Receive(absl::Time deadline, SqlResult* result
   }
 }
 
-PostgresError PostgresConnection::Execute(const std::string& sql, absl::Time deadline, SqlResult* result) {
+PostgresError PostgresConnection::Execute(const std::string& sql, absl::Duration deadline, SqlResult* result) {
   if (PQsendQuery(connection_, sql.c_str()) == 0) return ConnectionError("cannot send");
   return Receive(deadline, result);
 }
 
 PostgresError PostgresConnection::Run(const std::string& name, const PostgresStatement& statement,
-                                      const SqlParameters& parameters, absl::Time deadline, SqlResult* result) {
+                                      const SqlParameters& parameters, absl::Duration deadline, SqlResult* result) {
   std::vector<std::string> texts(statement.parameters.size());
   std::vector<const char*> values(statement.parameters.size(), nullptr);
   for (size_t i = 0; i < values.size(); ++i) {
@@ -221,12 +221,12 @@ PostgresError PostgresConnection::Run(const std::string& name, const PostgresSta
   return Receive(deadline, result);
 }
 
-PostgresError PostgresConnection::RunCommand(const std::string& command, absl::Time deadline) {
+PostgresError PostgresConnection::RunCommand(const std::string& command, absl::Duration deadline) {
   SqlResult ignored;
   return Execute(command, deadline, &ignored);
 }
 
-PostgresError PostgresConnection::Migrate(absl::Time deadline) {
+PostgresError PostgresConnection::Migrate(absl::Duration deadline) {
   SqlResult result;
   PostgresError error =
       Execute(absl::StrCat("BEGIN; SELECT pg_advisory_xact_lock(", kMigrationLock,

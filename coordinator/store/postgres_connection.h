@@ -51,21 +51,21 @@ class PostgresConnection {
   ~PostgresConnection();
 
   PostgresError Run(const std::string& name, const PostgresStatement& statement, const SqlParameters& parameters,
-                    absl::Time deadline, SqlResult* result);
+                    absl::Duration deadline, SqlResult* result);
   // BEGIN, COMMIT or ROLLBACK.
-  PostgresError RunCommand(const std::string& command, absl::Time deadline);
+  PostgresError RunCommand(const std::string& command, absl::Duration deadline);
   // Applies the migrations that the database lacks, in one transaction. Coordinators that start at once wait for each
   // other (an advisory lock).
-  PostgresError Migrate(absl::Time deadline);
+  PostgresError Migrate(absl::Duration deadline);
   // Alive as far as is known, and not left inside a transaction.
   bool IsReusable() const;
 
  private:
   PostgresConnection(pg_conn* connection, std::string description);
-  PostgresError Execute(const std::string& sql, absl::Time deadline, SqlResult* result);
+  PostgresError Execute(const std::string& sql, absl::Duration deadline, SqlResult* result);
   // The results of what was sent; `result` gets the rows of the last.
-  PostgresError Receive(absl::Time deadline, SqlResult* result);
-  bool WaitForInput(absl::Time deadline);
+  PostgresError Receive(absl::Duration deadline, SqlResult* result);
+  bool WaitForInput(absl::Duration deadline);
   PostgresError ConnectionError(const std::string& what);
   PostgresError ResultError(const pg_result* result);
 

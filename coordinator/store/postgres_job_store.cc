@@ -53,14 +53,14 @@ class PostgresDatabase : public SqlDatabase {
   }
 
   absl::Status Migrate() {
-    return Attempt([](PostgresConnection& connection, absl::Time deadline) { return connection.Migrate(deadline); });
+    return Attempt([](PostgresConnection& connection, absl::Duration deadline) { return connection.Migrate(deadline); });
   }
 
   absl::StatusOr<SqlResult> Run(const std::string& name, const SqlParameters& parameters) override {
     const auto statement = statements_.find(name);
     MW_CHECK(statement != statements_.end());
     SqlResult result;
-    MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Time deadline) {
+    MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Duration deadline) {
       return connection.Run(name, statement->second, parameters, deadline, &result);
     }));
     return result;
@@ -87,7 +87,7 @@ class PostgresDatabase : public SqlDatabase {
   absl::StatusOr<std::vector<SqlResult>> RunTransaction(const std::vector<SqlCall>& calls, bool each_changes_one_row) {
     std::vector<SqlResult> results;
     bool all_changed = true;
-    MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Time deadline) {
+    MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Duration deadline) {
       results.clear();
       all_changed = true;
       PostgresError error = connection.RunCommand("BEGIN", deadline);
@@ -105,11 +105,11 @@ class PostgresDatabase : public SqlDatabase {
     return results;
   }
 
-  using Action = std::function<PostgresError(PostgresConnection&, absl::Time deadline)>;
+  using Action = std::function<PostgresError(PostgresConnection&, absl::Duration deadline)>;
 
   // Runs the action until it succeeds, is refused, or retry_deadline ends.
   absl::Status Attempt(const Action& action) {
-    const absl::Time deadline = MonotonicNow() + options_.retry_deadline;
+    const absl::Duration deadline = SystemClock().Uptime() + options_.retry_deadline;
     std::unique_ptr<PostgresConnection> connection;
     if (!TakeTurn(deadline, &connection)) {
       return absl::UnavailableError(
@@ -138,7 +138,7 @@ class PostgresDatabase : public SqlDatabase {
       if (error.fault == PostgresFault::kBroken) connection.reset();
       if (error.fault == PostgresFault::kFinal) break;
       if (error.fault == PostgresFault::kTransient && ++transient_errors == kTransientAttempts) break;
-      if (MonotonicNow() + pause >= deadline) break;
+      if (SystemClock().Uptime() + pause >= deadline) break;
       // A connection that lay in the pool may have died long ago: no reason to wait before making a new one.
       if (error.fault == PostgresFault::kBroken && !is_new) continue;
       absl::SleepFor(pause);
@@ -149,10 +149,10 @@ class PostgresDatabase : public SqlDatabase {
   }
 
   // Waits until fewer than the allowed number of calls are under way; `connection` is an idle one if there is any.
-  bool TakeTurn(absl::Time deadline, std::unique_ptr<PostgresConnection>* connection) {
+  bool TakeTurn(absl::Duration deadline, std::unique_ptr<PostgresConnection>* connection) {
     MutexLock lock(mutex_);
     while (running_ >= options_.connections) {
-      const absl::Duration left = deadline - MonotonicNow();
+      const absl::Duration left = deadline - SystemClock().Uptime();
       if (left <= absl::ZeroDuration()) return false;
       freed_.WaitFor(lock, absl::ToChronoNanoseconds(left));
     }

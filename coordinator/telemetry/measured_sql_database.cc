@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include <absl/time/clock.h>
-
 namespace meshwright {
 namespace {
 
@@ -82,9 +80,9 @@ MeasuredSqlDatabase::MeasuredSqlDatabase(std::unique_ptr<SqlDatabase> database, 
 }
 
 absl::StatusOr<SqlResult> MeasuredSqlDatabase::Run(const std::string& statement, const SqlParameters& parameters) {
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   absl::StatusOr<SqlResult> result = database_->Run(statement, parameters);
-  Record(statement, begun, result.status());
+  Record(statement, stopwatch, result.status());
   if (result.ok()) {
     CountChanges(statement, parameters, static_cast<int64_t>(result->rows.size()), result->changed);
   }
@@ -92,9 +90,9 @@ absl::StatusOr<SqlResult> MeasuredSqlDatabase::Run(const std::string& statement,
 }
 
 absl::StatusOr<bool> MeasuredSqlDatabase::RunTogether(const std::vector<SqlCall>& calls) {
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   absl::StatusOr<bool> changed = database_->RunTogether(calls);
-  Record("transaction", begun, changed.status());
+  Record("transaction", stopwatch, changed.status());
   if (changed.ok() && *changed) {
     for (const SqlCall& call : calls) CountChanges(call.statement, call.parameters, 0, 1);
   }
@@ -102,9 +100,9 @@ absl::StatusOr<bool> MeasuredSqlDatabase::RunTogether(const std::vector<SqlCall>
 }
 
 absl::StatusOr<std::vector<SqlResult>> MeasuredSqlDatabase::RunAll(const std::vector<SqlCall>& calls) {
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   absl::StatusOr<std::vector<SqlResult>> results = database_->RunAll(calls);
-  Record("transaction", begun, results.status());
+  Record("transaction", stopwatch, results.status());
   if (!results.ok()) return results;
   for (size_t i = 0; i < calls.size(); ++i) {
     const SqlResult& result = (*results)[i];
@@ -113,8 +111,8 @@ absl::StatusOr<std::vector<SqlResult>> MeasuredSqlDatabase::RunAll(const std::ve
   return results;
 }
 
-void MeasuredSqlDatabase::Record(const std::string& operation, absl::Time begun, const absl::Status& status) {
-  calls_.Record(operation, absl::Now() - begun, status);
+void MeasuredSqlDatabase::Record(const std::string& operation, const Stopwatch& stopwatch, const absl::Status& status) {
+  calls_.Record(operation, stopwatch.Elapsed(), status);
   if (!status.ok()) {
     log_.Error("store failed", {{"operation", operation}, {"error", std::string(status.message())}});
   }

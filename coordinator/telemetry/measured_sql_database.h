@@ -7,6 +7,7 @@
 #include <absl/status/statusor.h>
 #include <absl/time/time.h>
 
+#include "common/base/clock.h"
 #include "common/telemetry/log.h"
 #include "common/telemetry/metrics.h"
 #include "coordinator/store/sql_database.h"
@@ -27,7 +28,7 @@ class MeasuredSqlDatabase final : public SqlDatabase {
   absl::StatusOr<absl::Time> Now() override { return database_->Now(); }
 
  private:
-  void Record(const std::string& operation, absl::Time begun, const absl::Status& status);
+  void Record(const std::string& operation, const Stopwatch& stopwatch, const absl::Status& status);
   void CountChanges(const std::string& statement, const SqlParameters& parameters, int64_t rows, int64_t changed);
 
   const std::unique_ptr<SqlDatabase> database_;

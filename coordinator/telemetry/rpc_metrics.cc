@@ -3,7 +3,8 @@
 #include <string>
 
 #include <absl/status/status.h>
-#include <absl/time/clock.h>
+
+#include "common/base/clock.h"
 
 namespace meshwright {
 namespace {
@@ -15,13 +16,12 @@ std::string NameOfMethod(const std::string& path) { return path.substr(path.rfin
 
 class RpcInterceptor final : public grpc::experimental::Interceptor {
  public:
-  RpcInterceptor(std::string operation, CallMetrics& calls)
-      : operation_(std::move(operation)), calls_(calls), begun_(absl::Now()) {}
+  RpcInterceptor(std::string operation, CallMetrics& calls) : operation_(std::move(operation)), calls_(calls) {}
 
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
       const auto code = static_cast<absl::StatusCode>(methods->GetSendStatus().error_code());
-      calls_.Record(operation_, absl::Now() - begun_, absl::Status(code, ""));
+      calls_.Record(operation_, stopwatch_.Elapsed(), absl::Status(code, ""));
     }
     methods->Proceed();
   }
@@ -29,7 +29,7 @@ class RpcInterceptor final : public grpc::experimental::Interceptor {
  private:
   const std::string operation_;
   CallMetrics& calls_;
-  const absl::Time begun_;
+  const Stopwatch stopwatch_;
 };
 
 class RpcMetrics final : public grpc::experimental::ServerInterceptorFactoryInterface {

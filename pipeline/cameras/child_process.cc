@@ -16,6 +16,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "common/base/clock.h"
+
 namespace meshwright {
 namespace {
 
@@ -93,8 +95,8 @@ class Child {
 
   void EndGroup(const std::function<void(const std::string& line)>& on_line) {
     ::kill(-pid_, SIGTERM);
-    const absl::Time deadline = absl::Now() + kTermGrace;
-    while (!HasEnded(false) && absl::Now() < deadline) {
+    const Stopwatch since_term;
+    while (!HasEnded(false) && since_term.Elapsed() < kTermGrace) {
       ReadLines(on_line);
       absl::SleepFor(absl::Milliseconds(20));
     }

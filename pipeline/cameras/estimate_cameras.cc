@@ -15,7 +15,6 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
-#include <absl/time/clock.h>
 #include <absl/time/time.h>
 #include <nlohmann/json.hpp>
 
@@ -525,8 +524,9 @@ absl::StatusOr<std::string> FindColmap(const std::string& program) {
   const auto on_line = [&](const std::string& line) {
     if (version.empty() && absl::StartsWith(line, "COLMAP ")) version = line.substr(7, line.find(' ', 7) - 7);
   };
-  const absl::Time deadline = absl::Now() + absl::Seconds(30);
-  const absl::StatusOr<ChildExit> exit = RunChild({program, "help"}, on_line, [&] { return absl::Now() > deadline; });
+  const Stopwatch stopwatch;
+  const absl::StatusOr<ChildExit> exit =
+      RunChild({program, "help"}, on_line, [&] { return stopwatch.Elapsed() > absl::Seconds(30); });
   if (absl::IsCancelled(exit.status())) {
     return absl::FailedPreconditionError(absl::StrCat(FindProgram(program), ": does not answer"));
   }

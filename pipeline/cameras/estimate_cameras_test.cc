@@ -17,6 +17,7 @@
 #include "pipeline/cameras/photographs_testing.h"
 
 #include "common/base/bad_input.h"
+#include "common/base/files.h"
 #include "common/scene/formats/import.h"
 
 namespace meshwright {

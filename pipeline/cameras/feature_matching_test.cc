@@ -71,7 +71,7 @@ class FeatureMatchingTest : public testing::Test {
     MW_CHECK(sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
   }
 
-  TestFolder folder_;
+  TemporaryFolder folder_;
   const std::string path_;
   std::unique_ptr<ColmapDatabase> database_;
   ThreadPool pool_{3};

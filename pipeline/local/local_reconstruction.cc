@@ -9,7 +9,6 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <absl/time/clock.h>
 
 #include "pipeline/config/parse_config.h"
 #include "pipeline/local/report.h"
@@ -331,7 +330,7 @@ class LocalReconstruction {
     // Of this process; a resumed reconstruction's earlier processes took theirs.
     report["process"] = {{"threads", settings_.threads},
                          {"cameras_done_before", progress_.resumed_from},
-                         {"wall_seconds", absl::ToDoubleSeconds(absl::Now() - start_)},
+                         {"wall_seconds", stopwatch_.Seconds()},
                          {"cpu_seconds", usage.cpu_seconds},
                          {"peak_memory_bytes", usage.peak_rss_bytes}};
     report["cameras"] = std::move(cameras["cameras"]);
@@ -343,7 +342,7 @@ class LocalReconstruction {
   const LocalSettings& settings_;
   const CameraJobFunction& job_;
   const ProgressListener& listener_;
-  const absl::Time start_ = absl::Now();
+  const Stopwatch stopwatch_;
   RealClock clock_;
   ThreadPool pool_{settings_.threads};
   std::vector<FileStamp> stamps_;  // of the photographs, before they were digested

@@ -7,6 +7,8 @@
 
 #include <sys/types.h>
 
+#include "common/base/clock.h"
+
 namespace meshwright::end_to_end {
 
 // A program in the background, its output appended to a file; killed when it goes out of scope.
@@ -28,9 +30,9 @@ class BackgroundProgram {
 
 template <typename Condition>
 bool WaitUntil(const Condition& condition, double seconds) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  const Stopwatch stopwatch;
   while (!condition()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
+    if (stopwatch.Seconds() > seconds) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   return true;

@@ -18,12 +18,12 @@
 #include <unistd.h>
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 
 namespace meshwright::end_to_end {
 namespace {
 
 namespace fs = std::filesystem;
-using SteadyClock = std::chrono::steady_clock;
 
 [[noreturn]] void Become(const std::vector<std::string>& arguments, const RunSettings& settings, const std::string& out,
                          const std::string& err) {
@@ -50,16 +50,15 @@ RunResult RunMeshwright(const std::vector<std::string>& arguments, const RunSett
   const TemporaryFolder folder;
   const std::string out = folder / "out";
   const std::string err = folder / "err";
-  const auto start = SteadyClock::now();
+  const Stopwatch stopwatch;
   const pid_t child = ::fork();
   MW_CHECK(child >= 0);
   if (child == 0) Become(arguments, settings, out, err);
 
   int status = 0;
   if (settings.kill_after_seconds.has_value()) {
-    const auto deadline = start + std::chrono::duration<double>(*settings.kill_after_seconds);
     while (::waitpid(child, &status, WNOHANG) == 0) {
-      if (SteadyClock::now() >= deadline) {
+      if (stopwatch.Seconds() >= *settings.kill_after_seconds) {
         ::kill(child, SIGKILL);
         ::waitpid(child, &status, 0);
         break;
@@ -70,7 +69,7 @@ RunResult RunMeshwright(const std::vector<std::string>& arguments, const RunSett
     ::waitpid(child, &status, 0);
   }
   RunResult result;
-  result.seconds = std::chrono::duration<double>(SteadyClock::now() - start).count();
+  result.seconds = stopwatch.Seconds();
   if (WIFEXITED(status)) result.exit_code = WEXITSTATUS(status);
   if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
   result.out = ReadBytes(out);

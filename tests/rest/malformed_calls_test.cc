@@ -15,6 +15,7 @@
 #include "meshwright/v1/reconstruction.grpc.pb.h"
 #include "meshwright/v1/worker.grpc.pb.h"
 
+#include "common/base/clock.h"
 #include "tests/rest/rest_cluster.h"
 
 namespace meshwright {
@@ -340,7 +341,7 @@ TEST_F(MalformedCallsTest, OverGrpc) {
   };
   for (const Case& c : cases) {
     grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(20));
+    context.set_deadline(absl::ToChronoTime(SystemClock().Now() + absl::Seconds(20)));
     const grpc::Status status = c.call(&context);
     EXPECT_EQ(status.error_code(), c.code) << c.name << ": " << status.error_message();
     EXPECT_THAT(status.error_message(), HasSubstr(c.message)) << c.name;

@@ -5,6 +5,7 @@
 #include <absl/time/clock.h>
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 #include "common/base/method_version.h"
 #include "common/surface/codec.h"
 #include "tests/scale/wall_world.h"
@@ -13,7 +14,7 @@ namespace meshwright::scale {
 
 FakeWorkerFigures FakeWorker::Run() {
   FakeWorkerFigures figures;
-  const absl::Time begun = absl::Now();
+  const Stopwatch since_begun;
   v1::SynchronizeRequest request;
   request.set_worker_id(id_);
   request.set_instance(id_);
@@ -23,7 +24,7 @@ FakeWorkerFigures FakeWorker::Run() {
   while (!stopping_) {
     const bool brings_result = request.held_size() > 0;
     request.set_wait_timeout_seconds(brings_result ? 0 : 5);
-    const absl::Time asked = absl::Now();
+    const Stopwatch since_asked;
     const absl::StatusOr<v1::SynchronizeResponse> answer = channel_.Synchronize(request);
     if (!answer.ok()) {
       if (stopping_) break;
@@ -31,7 +32,7 @@ FakeWorkerFigures FakeWorker::Run() {
       absl::SleepFor(absl::Milliseconds(200));
       continue;  // repeating a call is harmless
     }
-    if (brings_result) figures.answer_seconds.push_back(absl::ToDoubleSeconds(absl::Now() - asked));
+    if (brings_result) figures.answer_seconds.push_back(since_asked.Seconds());
 
     // A result that is listed once more has not been taken yet; every other job is a new one.
     std::optional<v1::HeldJob> waiting;
@@ -48,18 +49,18 @@ FakeWorkerFigures FakeWorker::Run() {
     if (waiting.has_value()) *request.add_held() = *waiting;
     if (next == nullptr) continue;
 
-    const absl::Time started = absl::Now();
+    const Stopwatch since_started;
     absl::SleepFor(job_);
     const absl::StatusOr<std::string> digest = blobs_.Put(EncodeSurface(WallWorld::FilteredSurface(next->camera())));
     MW_CHECK(digest.ok());
-    figures.busy_seconds += absl::ToDoubleSeconds(absl::Now() - started);
+    figures.busy_seconds += since_started.Seconds();
     ++figures.jobs;
     v1::HeldJob* held = request.add_held();
     *held->mutable_key() = next->key();
     held->mutable_finished()->set_filtered_digest(*digest);
     held->mutable_finished()->set_report_json("{}");
   }
-  figures.elapsed_seconds = absl::ToDoubleSeconds(absl::Now() - begun);
+  figures.elapsed_seconds = since_begun.Seconds();
   return figures;
 }
 

@@ -19,6 +19,7 @@
 #include "clients/cpp/service_client.h"
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 #include "common/blob/filesystem_blob_store.h"
 #include "coordinator/store/postgres_testing.h"
 #include "tests/end_to_end/background_program.h"
@@ -121,7 +122,7 @@ int Measure(const Settings& settings) {
   EventListeners listeners(end_to_end::ListeningPort(log, "HTTP on port "), name_of(0), settings.event_streams);
   std::vector<FakeWorkerFigures> figures(workers.size());
   std::vector<std::thread> threads;
-  const absl::Time begun = absl::Now();
+  const Stopwatch stopwatch;
   for (size_t i = 0; i < workers.size(); ++i) {
     threads.emplace_back([&, i] { figures[i] = workers[i]->Run(); });
   }
@@ -136,12 +137,12 @@ int Measure(const Settings& settings) {
       MW_CHECK(now->state() != v1::RECONSTRUCTION_STATE_FAILED);
       committed += now->progress().cameras_committed();
       if (now->progress().cameras_committed() + now->progress().cameras_skipped() >= now->progress().cameras_total()) {
-        ended.try_emplace(name_of(i), absl::ToDoubleSeconds(absl::Now() - begun));
+        ended.try_emplace(name_of(i), stopwatch.Seconds());
       }
     }
     absl::SleepFor(absl::Milliseconds(100));
   }
-  const double elapsed = absl::ToDoubleSeconds(absl::Now() - begun);
+  const double elapsed = stopwatch.Seconds();
   for (const auto& worker : workers) worker->Stop();
   for (std::thread& thread : threads) thread.join();
 

@@ -1,7 +1,6 @@
 #include "worker/agent/agent.h"
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <new>
 #include <random>
@@ -21,11 +20,10 @@ namespace {
 
 constexpr double kWaitTimeoutSeconds = 10;
 constexpr double kDrainingWaitTimeoutSeconds = 0.5;
-constexpr std::chrono::milliseconds kFirstRetry(200);
-constexpr std::chrono::milliseconds kLastRetry(5000);
+constexpr BackoffOptions kRetry = {.first = absl::Milliseconds(200), .longest = absl::Seconds(5)};
 constexpr int64_t kCacheShare = 8;
-constexpr absl::Duration kMinBackoff = absl::Seconds(2);
-constexpr absl::Duration kMaxBackoff = absl::Minutes(2);
+// Before a worker that cannot reach the blobs takes jobs again.
+constexpr BackoffOptions kBlobBackoff = {.first = absl::Seconds(2), .longest = absl::Minutes(2)};
 
 std::string DrawInstance() {
   std::random_device random;
@@ -69,15 +67,17 @@ absl::StatusOr<CameraJobSpec> ToSpec(const v1::CameraJob& job, size_t cameras) {
 }  // namespace
 
 Agent::Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, JobConfigParser parse, AgentJob job,
-             Logger log)
+             Logger log, const Clock& clock)
     : options_(options),
       instance_(DrawInstance()),
       channel_(channel),
       blobs_(blobs),
       job_(std::move(job)),
       log_(std::move(log)),
+      clock_(clock),
       contexts_(blobs_, std::move(parse), options.memory_bytes / kCacheShare),
-      pool_(options.cores) {}
+      pool_(options.cores),
+      backoff_(kBlobBackoff) {}
 
 Agent::~Agent() {
   for (auto& [key, held] : held_) held.thread.join();
@@ -88,14 +88,14 @@ void Agent::Drain() {
     const MutexLock lock(mutex_);
     if (draining_) return;
     draining_ = true;
-    drain_until_ = MonotonicNow() + options_.drain;
+    drain_until_ = clock_.Uptime() + options_.drain;
   }
   wake_.NotifyAll();
   channel_.Interrupt();
 }
 
 v1::SynchronizeRequest Agent::NextRequest() {
-  const absl::Time now = MonotonicNow();
+  const absl::Duration now = clock_.Uptime();
   v1::SynchronizeRequest request;
   request.set_worker_id(options_.worker_id);
   request.set_instance(instance_);
@@ -150,7 +150,7 @@ void Agent::Follow(const v1::SynchronizeResponse& response) {
       Held& held = held_[key];
       *held.told.mutable_key() = job->key();
       held.told.mutable_running();
-      held.begun = MonotonicNow();
+      held.begun = clock_.Uptime();
       held.thread = std::thread([this, key = key, job = *job] { Work(key, job); });
     }
   }
@@ -160,9 +160,9 @@ void Agent::Follow(const v1::SynchronizeResponse& response) {
 void Agent::Work(const Key& key, const v1::CameraJob& job) {
   const Logger log = log_.With(FieldsOf(job.key())).With({{"camera", static_cast<int64_t>(job.camera())}});
   log.Info("job begun");
-  const absl::Time begun = MonotonicNow();
+  const Stopwatch stopwatch(clock_);
   v1::HeldJob told = Process(job);
-  const double seconds = absl::ToDoubleSeconds(MonotonicNow() - begun);
+  const double seconds = stopwatch.Seconds();
   if (told.has_failed()) {
     log.Error("job failed", {{"seconds", seconds}, {"error", told.failed().reason()}});
   } else {
@@ -170,10 +170,8 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
   }
   {
     const MutexLock lock(mutex_);
-    if (told.has_finished()) failures_ = 0;
-    if (told.has_failed() && told.failed().infrastructure()) {
-      backoff_until_ = MonotonicNow() + std::min(kMaxBackoff, kMinBackoff * (int64_t{1} << std::min(failures_++, 20)));
-    }
+    if (told.has_finished()) backoff_.Reset();
+    if (told.has_failed() && told.failed().infrastructure()) backoff_until_ = clock_.Uptime() + backoff_.Next();
     Held& held = held_.at(key);
     held.told = std::move(told);
     held.running = false;
@@ -221,21 +219,20 @@ bool Agent::Finished() {
 }
 
 void Agent::Run() {
-  std::chrono::milliseconds retry = kFirstRetry;
+  Backoff retry(kRetry);
   while (true) {
     const bool last = Finished();
     const absl::StatusOr<v1::SynchronizeResponse> response = channel_.Synchronize(NextRequest());
     if (response.ok()) {
       Follow(*response);
-      retry = kFirstRetry;
+      retry.Reset();
     }
     if (last) return;
     if (response.ok() || absl::IsCancelled(response.status())) continue;
     log_.Warning("no answer from the coordinator", {{"error", std::string(response.status().message())}});
     MutexLock lock(mutex_);
-    if (MonotonicNow() >= drain_until_) return;
-    wake_.WaitFor(lock, retry);
-    retry = std::min(2 * retry, kLastRetry);
+    if (clock_.Uptime() >= drain_until_) return;
+    wake_.WaitFor(lock, absl::ToChronoMilliseconds(retry.Next()));
   }
 }
 

@@ -12,6 +12,8 @@
 
 #include "meshwright/v1/worker.pb.h"
 
+#include "common/base/backoff.h"
+#include "common/base/clock.h"
 #include "common/base/method_version.h"
 #include "common/base/mutex.h"
 #include "common/base/thread_pool.h"
@@ -41,9 +43,9 @@ using AgentJob = std::function<CameraJobResult(const CameraJobInput&, const Came
 // memory; losing it costs the jobs that run, nothing else.
 class Agent {
  public:
-  // `channel` and `blobs` outlive the agent. `log` is told of jobs begun, finished, failed and dropped.
+  // `channel`, `blobs` and `clock` outlive the agent. `log` is told of jobs begun, finished, failed and dropped.
   Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blobs, JobConfigParser parse, AgentJob job,
-        Logger log);
+        Logger log, const Clock& clock = SystemClock());
   // Waits for jobs that still run.
   ~Agent();
 
@@ -55,8 +57,8 @@ class Agent {
  private:
   using Key = std::tuple<std::string, int32_t, int64_t>;  // reconstruction, sequence, epoch
   struct Held {
-    v1::HeldJob told;  // what the coordinator is told
-    absl::Time begun;
+    v1::HeldJob told;      // what the coordinator is told
+    absl::Duration begun;  // these and those below by Clock::Uptime()
     bool running = true;
     bool dropped = false;  // nobody wants the result
     std::thread thread;
@@ -74,6 +76,7 @@ class Agent {
   LostBlobNamer blobs_;
   const AgentJob job_;
   const Logger log_;
+  const Clock& clock_;
   JobContexts contexts_;
   ThreadPool pool_;
 
@@ -81,10 +84,10 @@ class Agent {
   ConditionVariable wake_;
   std::map<Key, Held> held_ ABSL_GUARDED_BY(mutex_);
   bool draining_ ABSL_GUARDED_BY(mutex_) = false;
-  absl::Time drain_until_ ABSL_GUARDED_BY(mutex_) = absl::InfiniteFuture();
+  absl::Duration drain_until_ ABSL_GUARDED_BY(mutex_) = absl::InfiniteDuration();
   // A worker that cannot reach the blobs leaves the jobs to others for a while.
-  int failures_ ABSL_GUARDED_BY(mutex_) = 0;  // since the last job that finished
-  absl::Time backoff_until_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
+  Backoff backoff_ ABSL_GUARDED_BY(mutex_);
+  absl::Duration backoff_until_ ABSL_GUARDED_BY(mutex_) = -absl::InfiniteDuration();
 };
 
 }  // namespace meshwright

@@ -118,7 +118,7 @@ class AgentTest : public testing::Test {
       return JobConfig{};
     };
     agent_ = std::make_unique<Agent>(AgentOptions{.worker_id = "w", .cores = 2, .drain = drain}, coordinator_, *blobs_,
-                                     parse, std::move(job), Logger::Nowhere());
+                                     parse, std::move(job), Logger::Nowhere(), clock_);
     thread_ = std::thread([this] { agent_->Run(); });
   }
   void Stop() {
@@ -160,6 +160,7 @@ class AgentTest : public testing::Test {
   std::unique_ptr<FilesystemBlobStore> blobs_;
   std::string scene_digest_;
   PlayedCoordinator coordinator_;
+  ManualClock clock_;
   std::unique_ptr<Agent> agent_;
   std::thread thread_;
 };
@@ -234,6 +235,13 @@ TEST_F(AgentTest, AMissingBlobIsNamedAndOtherJobsAreLeftToOthersForAWhile) {
   EXPECT_TRUE(request.held(0).failed().infrastructure());
   EXPECT_EQ(request.held(0).failed().damaged_blob(), job.scene_digest());
   EXPECT_TRUE(request.draining());
+  // For at least half of the 2 s after a first failure, and no longer than all of them.
+  coordinator_.Want({});
+  clock_.Advance(absl::Seconds(0.9));
+  const auto holds_nothing = [](const auto& said) { return said.held_size() == 0; };
+  EXPECT_TRUE(coordinator_.WaitFor(holds_nothing).draining());
+  clock_.Advance(absl::Seconds(1.1));
+  coordinator_.WaitFor([](const auto& said) { return !said.draining(); });
 }
 
 TEST_F(AgentTest, GoesOnWhenTheCoordinatorAnswersAgain) {

@@ -1,6 +1,5 @@
 #include "worker/agent/grpc_coordinator.h"
 
-#include <chrono>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -8,6 +7,7 @@
 
 #include "meshwright/v1/worker.grpc.pb.h"
 
+#include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/base/mutex.h"
 #include "common/base/status_macros.h"
@@ -19,7 +19,7 @@ constexpr size_t kChunkBytes = size_t{256} << 10;
 constexpr int kMaxMessageBytes = 64 << 20;
 // Added to the wait timeout that a request asks for.
 constexpr double kAnswerSeconds = 10;
-constexpr std::chrono::minutes kBlobDeadline(10);
+constexpr absl::Duration kBlobDeadline = absl::Minutes(10);
 
 absl::Status FromGrpc(const grpc::Status& status) {
   if (status.ok()) return absl::OkStatus();
@@ -35,8 +35,7 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
     grpc::ClientContext context;
     ShowKey(context);
     context.set_deadline(
-        std::chrono::system_clock::now() +
-        std::chrono::milliseconds(static_cast<int64_t>(1000 * (request.wait_timeout_seconds() + kAnswerSeconds))));
+        absl::ToChronoTime(SystemClock().Now() + absl::Seconds(request.wait_timeout_seconds() + kAnswerSeconds)));
     {
       const MutexLock lock(mutex_);
       if (std::exchange(interrupted_, false)) return absl::CancelledError("interrupted");
@@ -64,7 +63,7 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
   absl::StatusOr<std::string> Put(const std::string& bytes) override {
     grpc::ClientContext context;
     ShowKey(context);
-    context.set_deadline(std::chrono::system_clock::now() + kBlobDeadline);
+    context.set_deadline(absl::ToChronoTime(SystemClock().Now() + kBlobDeadline));
     v1::PutBlobResponse response;
     const auto writer = stub_->PutBlob(&context, &response);
     v1::PutBlobRequest request;
@@ -83,7 +82,7 @@ class RealGrpcCoordinator final : public GrpcCoordinator {
     MW_RETURN_IF_ERROR(ValidateDigest(digest));
     grpc::ClientContext context;
     ShowKey(context);
-    context.set_deadline(std::chrono::system_clock::now() + kBlobDeadline);
+    context.set_deadline(absl::ToChronoTime(SystemClock().Now() + kBlobDeadline));
     v1::FetchBlobRequest request;
     request.set_digest(digest);
     const auto reader = stub_->FetchBlob(&context, request);

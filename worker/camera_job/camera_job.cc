@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include <absl/time/clock.h>
-
 #include "common/base/check.h"
+#include "common/base/clock.h"
 #include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
 
@@ -13,18 +12,6 @@ namespace meshwright {
 namespace {
 
 constexpr int kWidestLattice = 16;  // px
-
-class StageTimer {
- public:
-  // Wall seconds since the last call or the construction.
-  double Lap() {
-    const absl::Time now = absl::Now();
-    return absl::ToDoubleSeconds(now - std::exchange(start_, now));
-  }
-
- private:
-  absl::Time start_ = absl::Now();
-};
 
 std::vector<SparsePointObservation> ObservationsOf(const CameraJobInput& input) {
   std::vector<SparsePointObservation> observations;
@@ -67,7 +54,7 @@ CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJo
   MW_CHECK(input.targets.size() <= kMaxTargets);
   CameraJobResult result;
   CameraJobReport& report = result.report;
-  StageTimer timer;
+  Stopwatch timer;
   const Camera& reference = input.reference.camera;
   const PatchScorer scorer = MakeScorer(input, options.scoring);
   report.rays = input.accepted.lattice.nodes();

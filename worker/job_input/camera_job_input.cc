@@ -4,9 +4,9 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
-#include <absl/time/clock.h>
 
 #include "common/base/bad_input.h"
+#include "common/base/clock.h"
 #include "common/base/status_macros.h"
 #include "common/surface/codec.h"
 
@@ -41,18 +41,17 @@ CameraJobInputMaker::CameraJobInputMaker(const Scene& scene, const std::vector<C
 absl::StatusOr<CameraJobInputMaker::Prepared> CameraJobInputMaker::Make(const CameraJobSpec& spec,
                                                                         ThreadPool& pool) const {
   Prepared prepared;
-  const absl::Time start = absl::Now();
   prepared.input.region = scene_.region;
+  Stopwatch stopwatch;
   MW_RETURN_IF_ERROR(LoadViews(spec, prepared.input, pool));
-  const absl::Time loaded = absl::Now();
+  prepared.seconds_loading = stopwatch.Lap();
   MW_RETURN_IF_ERROR(AddAcceptedSurfaces(spec, prepared.input, pool));
   for (const int32_t i : points_of_camera_[static_cast<size_t>(spec.camera)]) {
     const SparsePoint& point = scene_.points[static_cast<size_t>(i)];
     prepared.input.sparse_points.push_back(point.x_in_world);
     prepared.input.sparse_points_seen_by.push_back(point.seen_by);
   }
-  prepared.seconds_loading = absl::ToDoubleSeconds(loaded - start);
-  prepared.seconds_visibility = absl::ToDoubleSeconds(absl::Now() - loaded);
+  prepared.seconds_visibility = stopwatch.Lap();
   return prepared;
 }
 
