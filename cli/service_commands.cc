@@ -194,12 +194,12 @@ Json ToJson(const v1::Reconstruction& reconstruction) {
 
 int WatchUntilOver(const ServiceArguments& arguments, ServiceClient& client, const std::string& id) {
   v1::Reconstruction last;
-  absl::Time last_answer = absl::Now();
+  Stopwatch since_answer;
   const auto tell = [&](const v1::Reconstruction& now) {
     const bool news =
         now.state() != last.state() || now.progress().cameras_committed() != last.progress().cameras_committed();
     last = now;
-    last_answer = absl::Now();
+    since_answer = Stopwatch();
     if (arguments.output.quiet || !news) return;
     std::fprintf(stderr, "%s: %s, cameras %d/%d\n", id.c_str(), NameOf(now.state()).c_str(),
                  now.progress().cameras_committed(), now.progress().cameras_total());
@@ -208,7 +208,7 @@ int WatchUntilOver(const ServiceArguments& arguments, ServiceClient& client, con
   // It has answered before: it is being restarted, or the network is away for a while.
   const bool has_answered = !last.id().empty() || !IsNobodyThere(status);
   bool told = false;
-  while (has_answered && absl::IsUnavailable(status) && absl::Now() - last_answer < kCoordinatorMayBeAway) {
+  while (has_answered && absl::IsUnavailable(status) && since_answer.Elapsed() < kCoordinatorMayBeAway) {
     if (!told && !arguments.output.quiet) {
       std::fprintf(stderr, "%s: the coordinator does not answer; waiting for it\n", id.c_str());
     }

@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/blob/filesystem_blob_store.h"
@@ -141,8 +142,8 @@ class ReconstructionServiceTest : public testing::Test {
     request.set_memory_bytes(1 << 20);
     request.set_method_version(kMethodVersion);
     request.set_wait_timeout_seconds(0.05);
-    const absl::Time give_up = absl::Now() + absl::Seconds(60);
-    while (jobs > 0 && absl::Now() < give_up && !AllOver()) {
+    const Stopwatch waited;
+    while (jobs > 0 && waited.Elapsed() < absl::Seconds(60) && !AllOver()) {
       const auto response = workers_->Synchronize(request, [] { return false; });
       ASSERT_TRUE(response.ok()) << response.status();
       request.clear_held();
@@ -313,7 +314,7 @@ TEST_F(ReconstructionServiceTest, AnotherTakesOverWhateverTheClockSays) {
   request.set_id("wall");
   request.set_scene_reference("file:wall");
   ASSERT_TRUE(service_->Create(request).ok());
-  const absl::Time now = absl::Now();
+  const absl::Time now = SystemClock().Now();
   ASSERT_TRUE(store_->AcquireConductorLease("wall", "another", now + absl::Hours(1), now).ok());
   ASSERT_TRUE(service_->Start("wall").ok());
   RunWorker("w", 1000, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });

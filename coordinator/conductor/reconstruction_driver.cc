@@ -106,10 +106,11 @@ bool ReconstructionDriver::WaitForNews() {
 }
 
 bool ReconstructionDriver::WaitToRetry() {
-  const auto until = std::chrono::steady_clock::now() + kRetryDelay;
+  const Stopwatch waited;
+  const absl::Duration delay = absl::FromChrono(kRetryDelay);
   MutexLock lock(mutex_);
-  while (!stopping_ && std::chrono::steady_clock::now() < until) {
-    wake_.WaitFor(lock, until - std::chrono::steady_clock::now());
+  while (!stopping_ && waited.Elapsed() < delay) {
+    wake_.WaitFor(lock, absl::ToChronoNanoseconds(delay - waited.Elapsed()));
   }
   return !stopping_;
 }
@@ -282,8 +283,8 @@ absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionC
   absl::StatusOr<JoinedMeshCounts> counts = absl::UnknownError("not tried");
   for (int attempt = 0; attempt < kMaxRepairsInARow && !counts.ok(); ++attempt) {
     LostBlobNamer blobs(*environment_.blobs);
-    counts = WriteAcceptedMesh(loop.conductor().AcceptedSurfaces(), blobs, config.join, offset_, path,
-                               *environment_.pool);
+    counts =
+        WriteAcceptedMesh(loop.conductor().AcceptedSurfaces(), blobs, config.join, offset_, path, *environment_.pool);
     if (counts.ok()) break;
     const std::string lost = LostBlobOf(counts.status());
     if (lost.empty()) return counts.status();

@@ -17,6 +17,7 @@
 #include "common/base/digest.h"
 #include "common/base/relative_path.h"
 #include "common/base/status_macros.h"
+#include "common/base/version.h"
 #include "common/blob/staged_blob.h"
 #include "common/http_server/byte_range.h"
 #include "common/http_server/http_server.h"
@@ -288,7 +289,7 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
                  {"maxImages", nullptr},
                  // Tasks share the workers; more of them than cores would only wait.
                  {"maxParallelTasks", std::max(1, cores)},
-                 {"engineVersion", MW_VERSION},
+                 {"engineVersion", kProgramVersion},
                  {"engine", "meshwright"}};
     if (options_.max_images > 0) info["maxImages"] = options_.max_images;
     Answer(response, info);

@@ -11,6 +11,7 @@
 
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
+#include "common/base/version.h"
 #include "common/json/json_text.h"
 #include "common/json/parse_json.h"
 #include "common/mesh/formats/mesh_format.h"
@@ -80,7 +81,7 @@ class Maker {
     MW_RETURN_IF_ERROR(Write(kShots, Text(OdmShots(scene_))));
     MW_RETURN_IF_ERROR(Write(kOutput, absl::StrJoin(output_, "\n") + "\n"));
     MW_RETURN_IF_ERROR(
-        Write(kLog, Text({{"software", absl::StrCat("Meshwright ", MW_VERSION)},
+        Write(kLog, Text({{"software", absl::StrCat("Meshwright ", kProgramVersion)},
                           {"options", Json::parse(reconstruction_.options_json(), nullptr, false)},
                           {"images", task_.images},
                           {"cameras", {{"total", progress.cameras_total()}, {"skipped", progress.cameras_skipped()}}},

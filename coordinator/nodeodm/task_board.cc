@@ -13,6 +13,7 @@
 #include "common/base/check.h"
 #include "common/base/files.h"
 #include "common/base/status_macros.h"
+#include "common/base/version.h"
 #include "common/image/decode.h"
 #include "common/json/json_text.h"
 #include "coordinator/nodeodm/odm_files.h"
@@ -153,7 +154,7 @@ absl::StatusOr<std::string> TaskBoard::Begin(const NewOdmTask& wanted) {
     }
   }
   MW_RETURN_IF_ERROR(Update(task.uuid, [&](OdmTask&, std::vector<std::string>& lines) {
-    lines.push_back(absl::StrCat("Meshwright ", MW_VERSION));
+    lines.push_back(absl::StrCat("Meshwright ", kProgramVersion));
     if (!options.unused.empty()) {
       lines.push_back(absl::StrCat("Options that have no meaning here: ", absl::StrJoin(options.unused, ", ")));
     }
@@ -359,7 +360,7 @@ absl::Status TaskBoard::Restart(const std::string& uuid, const std::optional<std
     now.progress = 0;
     now.parts_told = 0;
     now.has_result = false;
-    lines.push_back(absl::StrCat("Meshwright ", MW_VERSION, ", started again"));
+    lines.push_back(absl::StrCat("Meshwright ", kProgramVersion, ", started again"));
   }));
   services_.reconstructions->Delete(ReconstructionOf(task)).IgnoreError();
   {

@@ -5,12 +5,12 @@
 
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
-#include <absl/time/clock.h>
 #include <curl/curl.h>
 #include <openssl/evp.h>
 #include <openssl/hmac.h>
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 
 namespace meshwright {
 namespace {
@@ -65,9 +65,9 @@ void WebhookSender::Send(std::string body) {
 }
 
 bool WebhookSender::Wait(absl::Duration pause) {
-  const absl::Time until = absl::Now() + pause;
+  const Stopwatch stopwatch;
   MutexLock lock(mutex_);
-  for (absl::Duration left = pause; !stopping_ && left > absl::ZeroDuration(); left = until - absl::Now()) {
+  for (absl::Duration left = pause; !stopping_ && left > absl::ZeroDuration(); left = pause - stopwatch.Elapsed()) {
     wake_.WaitFor(lock, absl::ToChronoNanoseconds(left));
   }
   return !stopping_;
@@ -100,7 +100,7 @@ void WebhookSender::Run() {
 absl::Status WebhookSender::SendOnce(const std::string& body) const {
   const std::unique_ptr<CURL, void (*)(CURL*)> handle(curl_easy_init(), curl_easy_cleanup);
   MW_CHECK(handle != nullptr);
-  const std::string timestamp = absl::StrCat(absl::ToUnixSeconds(absl::Now()));
+  const std::string timestamp = absl::StrCat(absl::ToUnixSeconds(SystemClock().Now()));
   curl_slist* headers = nullptr;
   for (const std::string& header :
        {std::string("Content-Type: application/json"), absl::StrCat("Meshwright-Timestamp: ", timestamp),

@@ -26,9 +26,10 @@ day=$(sed -nE 's/^## [0-9.]+ \(([0-9]{4}-[0-9]{2}-[0-9]{2})\)$/\1/p' <<<"$releas
 expect "CHANGELOG.md's newest release" "## $version ($day)" "$release"
 expect CITATION.cff "version: $version" "$(grep '^version:' CITATION.cff)"
 expect CITATION.cff "date-released: $day" "$(grep '^date-released:' CITATION.cff)"
-while read -r line; do
-  expect deploy/kubernetes/base/kustomization.yaml "newTag: $version" "$line"
-done < <(grep -o 'newTag:.*' deploy/kubernetes/base/kustomization.yaml)
+while IFS=: read -r file line; do
+  expect "$file" "newTag: $version" "$line"
+done < <(grep -ro --include=kustomization.yaml 'newTag:.*' deploy)
+expect clients/python/pyproject.toml "version = \"$version\"" "$(grep '^version' clients/python/pyproject.toml)"
 for program in "$@"; do
   expect "$program --version" "$(basename "$program") $version" "$("$program" --version)"
 done

@@ -1,7 +1,5 @@
 // Who may call over gRPC: with --api-token-file nobody without a key, whatever the method.
 
-#include <chrono>
-
 #include <gmock/gmock.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
@@ -10,6 +8,7 @@
 #include "meshwright/v1/reconstruction.pb.h"
 #include "meshwright/v1/worker.pb.h"
 
+#include "common/base/clock.h"
 #include "tests/rest/rest_cluster.h"
 
 namespace meshwright {
@@ -32,7 +31,7 @@ class GrpcTokenTest : public RestCluster {
   grpc::Status Call(const std::string& method, const std::string& authorization) const {
     grpc::GenericStub stub(grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
     grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(20));
+    context.set_deadline(absl::ToChronoTime(SystemClock().Now() + absl::Seconds(20)));
     if (!authorization.empty()) context.AddMetadata("authorization", authorization);
     grpc::CompletionQueue queue;
     const auto call = stub.PrepareCall(&context, method, &queue);
