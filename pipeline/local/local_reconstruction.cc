@@ -181,7 +181,7 @@ class LocalReconstruction {
     const absl::Time now = clock_.Now();
     MW_ASSIGN_OR_RETURN(lease_, HeldConductorLease::Acquire(work_->store(), WorkFolder::kReconstructionId, kConductor,
                                                             kConductorLease, now, /*lapsed_by=*/now));
-    MW_ASSIGN_OR_RETURN(const ReconstructionConfig config, ParseConfig(ToJson(options_).dump()));
+    MW_ASSIGN_OR_RETURN(const ReconstructionConfig config, ParseConfig(JsonText(ToJson(options_))));
     const OuterLoopEnvironment environment = {
         .store = &work_->store(), .blobs = &*blobs_, .clock = &clock_, .pool = &pool_};
     MW_ASSIGN_OR_RETURN(loop_, OuterLoop::Open(environment, WorkFolder::kReconstructionId, lease_->epoch(), cameras_,
