@@ -6,6 +6,8 @@
 
 #include "common/base/out_of_range.h"
 
+#include "coordinator/incidence/ball_grid.h"
+
 namespace meshwright {
 namespace {
 
@@ -39,24 +41,31 @@ bool OverlapGraph::Overlap(CameraIndex i, CameraIndex j) const {
 OverlapGraph FindOverlaps(const std::vector<CameraGeometry>& cameras, const std::vector<CameraProbes>& probes,
                           const IncidenceMatrix& feasible, const OverlapOptions& options, ThreadPool& pool) {
   const double cos_max_angle = std::cos(options.max_angle_deg * std::numbers::pi / 180);
-  std::vector<std::vector<CameraIndex>> later(cameras.size());  // row i: overlapping cameras after i
+  const BallGrid near(probes);
+  std::vector<std::vector<CameraIndex>> found(cameras.size());  // each pair in one of its two rows, or in both
   pool.ParallelFor(static_cast<int64_t>(cameras.size()), kCamerasPerPiece, [&](int64_t begin, int64_t end) {
+    std::vector<CameraIndex> meeting;
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      for (size_t j = i + 1; j < cameras.size(); ++j) {
-        if ((FrustaMeet(probes[i], probes[j]) &&
-             (SeesProbes(cameras[i], probes[i], cameras[j], probes[j], options.min_share, cos_max_angle) ||
-              SeesProbes(cameras[j], probes[j], cameras[i], probes[i], options.min_share, cos_max_angle))) ||
-            feasible.Get(static_cast<CameraIndex>(i), static_cast<CameraIndex>(j))) {
-          later[i].push_back(static_cast<CameraIndex>(j));
+      near.FindMeeting(static_cast<CameraIndex>(i), meeting);
+      for (const CameraIndex other : meeting) {
+        const auto j = static_cast<size_t>(other);
+        if (SeesProbes(cameras[i], probes[i], cameras[j], probes[j], options.min_share, cos_max_angle) ||
+            SeesProbes(cameras[j], probes[j], cameras[i], probes[i], options.min_share, cos_max_angle)) {
+          found[i].push_back(other);
         }
       }
+      const std::vector<CameraIndex>& paired = feasible.Neighbours(static_cast<CameraIndex>(i));
+      found[i].insert(found[i].end(), paired.begin(), paired.end());
     }
   });
-  std::vector<std::vector<CameraIndex>> rows(cameras.size());
+  std::vector<std::vector<CameraIndex>> rows = found;
   for (size_t i = 0; i < cameras.size(); ++i) {
-    for (const CameraIndex j : later[i]) rows[static_cast<size_t>(j)].push_back(static_cast<CameraIndex>(i));
+    for (const CameraIndex j : found[i]) rows[static_cast<size_t>(j)].push_back(static_cast<CameraIndex>(i));
   }
-  for (size_t i = 0; i < cameras.size(); ++i) rows[i].insert(rows[i].end(), later[i].begin(), later[i].end());
+  for (std::vector<CameraIndex>& row : rows) {
+    std::sort(row.begin(), row.end());
+    row.erase(std::unique(row.begin(), row.end()), row.end());
+  }
   return OverlapGraph(std::move(rows));
 }
 

@@ -39,8 +39,8 @@ class OverlapGraph {
 };
 
 // Overlap by probes (see camera_probes.h): each camera's few points are looked for in the others' images and depths.
-// Feasible pairs always overlap. Costs one distance between two balls per pair of cameras (nanoseconds) and at most
-// 2 * kMaxProbes projections per pair whose frusta come near each other.
+// Feasible pairs always overlap. Costs at most 2 * kMaxProbes projections per pair whose frusta come near each other
+// (see ball_grid.h): the other pairs of a large scene cost nothing.
 OverlapGraph FindOverlaps(const std::vector<CameraGeometry>& cameras, const std::vector<CameraProbes>& probes,
                           const IncidenceMatrix& feasible, const OverlapOptions& options, ThreadPool& pool);
 
