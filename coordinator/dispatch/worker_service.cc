@@ -103,8 +103,7 @@ v1::Attempt RunningAttempt(const OpenJob& job) {
 
 }  // namespace
 
-WorkerService::WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store,
-                             const Clock& clock)
+WorkerService::WorkerService(const LeaseOptions& lease, const RetryOptions& retry, JobStore& store, const Clock& clock)
     : lease_(lease), retry_(retry), store_(store), clock_(clock), watch_(lease) {
   thread_ = std::thread([this] { Run(); });
 }

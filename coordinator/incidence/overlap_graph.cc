@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "common/base/out_of_range.h"
-
 #include "coordinator/incidence/ball_grid.h"
 
 namespace meshwright {

@@ -11,8 +11,8 @@
 
 namespace meshwright {
 
-// How long leases of camera jobs have stood in the store as they are, by the uptime of this process's clock. Times in the
-// store are of a clock that may jump, by an hour at that: what they say is never held against a worker.
+// How long leases of camera jobs have stood in the store as they are, by the uptime of this process's clock. Times in
+// the store are of a clock that may jump, by an hour at that: what they say is never held against a worker.
 class LeaseWatch {
  public:
   explicit LeaseWatch(const LeaseOptions& lease) : lease_(lease) {}
@@ -26,7 +26,7 @@ class LeaseWatch {
 
  private:
   struct Seen {
-    absl::Time expires_at;       // as stored
+    absl::Time expires_at;           // as stored
     absl::Duration unchanged_since;  // uptime, as the next
     absl::Duration first;
   };

@@ -53,7 +53,8 @@ class PostgresDatabase : public SqlDatabase {
   }
 
   absl::Status Migrate() {
-    return Attempt([](PostgresConnection& connection, absl::Duration deadline) { return connection.Migrate(deadline); });
+    return Attempt(
+        [](PostgresConnection& connection, absl::Duration deadline) { return connection.Migrate(deadline); });
   }
 
   absl::StatusOr<SqlResult> Run(const std::string& name, const SqlParameters& parameters) override {

@@ -102,12 +102,14 @@ class SlowClientsTest : public testing::Test {
       commits.push_back(
           {.sequence = s, .camera = s - 1, .accepted_digest = digest, .filtered_patches = s, .accepted_patches = s});
     }
-    ASSERT_TRUE(store_->Advance(kId, {}, assignments, {}, now).ok());
+    const absl::StatusOr<int64_t> epoch = store_->AcquireConductorLease(kId, "test", now + absl::Hours(1), now);
+    ASSERT_TRUE(epoch.ok()) << epoch.status();
+    ASSERT_TRUE(store_->Advance(kId, {}, assignments, {}, now, *epoch).ok());
     ASSERT_TRUE(store_->ApplyChanges(claims, {}, now).ok());
     ASSERT_TRUE(store_->ApplyChanges(results, {}, now).ok());
-    const absl::Status committed = store_->Advance(kId, commits, {}, {.cameras_committed = kParts}, now);
+    const absl::Status committed = store_->Advance(kId, commits, {}, {.cameras_committed = kParts}, now, *epoch);
     ASSERT_TRUE(committed.ok()) << committed;
-    ASSERT_TRUE(store_->FinishReconstruction(kId, {.digest = digest}, now).ok());
+    ASSERT_TRUE(store_->FinishReconstruction(kId, {.digest = digest}, now, *epoch).ok());
   }
 
   // The events' text; "" and the status in `status` when there is no stream.

@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/blob/filesystem_blob_store.h"
 #include "common/image/encode.h"
@@ -292,7 +293,7 @@ TEST_F(HeldUpAgentTest, AJobThatSomebodyElseHasCostsItsCoreUntilItEndsAndIsNotTo
   LetGo();
   // Its thread ends by itself; soon after the core is there again.
   v1::SynchronizeRequest said;
-  for (int calls = 0; calls < 1000 && said.cores() != 2; ++calls) {
+  for (const Stopwatch waited; said.cores() != 2 && waited.Elapsed() < absl::Seconds(20);) {
     coordinator_.Want({});
     said = coordinator_.WaitFor([](const auto&) { return true; });
     EXPECT_EQ(said.held_size(), 0);

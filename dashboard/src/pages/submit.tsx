@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { api, ApiError, csrfHeader, errorOf, reconstructionUrl } from '../api/client';
 import type { Option } from '../api/types';
 import { Notice, PageTitle } from '../components/pieces';
@@ -33,7 +33,7 @@ function DropZone({ onFiles }: { onFiles: (files: FileToSend[], name: string) =>
   const [over, setOver] = useState(false);
   const folder = useRef<HTMLInputElement>(null);
   const files = useRef<HTMLInputElement>(null);
-  useEffect(() => folder.current?.setAttribute('webkitdirectory', ''), []);
+  useLayoutEffect(() => folder.current?.setAttribute('webkitdirectory', ''), []);
   const drop = async (event: DragEvent) => {
     event.preventDefault();
     setOver(false);
