@@ -118,11 +118,22 @@ struct Votes {
   uint8_t conflicts = 0;  // cameras that look through the patch
 };
 
+bool IsAccepted(const Votes& votes, const AcceptanceOptions& options) {
+  return votes.support >= options.k_a && votes.support > votes.conflicts;
+}
+
+// Whether the votes of `remaining` more cameras could still change what IsAccepted says.
+bool IsOpen(const Votes& votes, int remaining, const AcceptanceOptions& options) {
+  const int lead = static_cast<int>(votes.support) - static_cast<int>(votes.conflicts);
+  if (IsAccepted(votes, options)) return lead <= remaining;
+  return lead + remaining > 0 && votes.support + remaining >= options.k_a;
+}
+
 uint8_t OneMore(uint8_t count) { return count < 255 ? static_cast<uint8_t>(count + 1) : count; }
 
-// Adds one supporter's votes.
-void CountVotes(const PatchLattice& filtered, const SparseSurface& supporter, const AcceptanceOptions& options,
-                std::vector<Votes>& votes, ThreadPool& pool) {
+// Adds one supporter's votes on what is still open; `remaining` cameras vote, this one included.
+void CountVotes(const PatchLattice& filtered, const SparseSurface& supporter, int remaining,
+                const AcceptanceOptions& options, std::vector<Votes>& votes, ThreadPool& pool) {
   const SupportIndex index(supporter);
   const Camera& reference = filtered.camera;
   const Rigid3 supporter_from_reference = supporter.camera.cam_from_world * Inverse(reference.cam_from_world);
@@ -131,7 +142,7 @@ void CountVotes(const PatchLattice& filtered, const SparseSurface& supporter, co
     for (int row = static_cast<int>(begin); row < end; ++row) {
       for (int column = 0; column < lattice.columns; ++column) {
         const auto node = static_cast<size_t>(lattice.Index(column, row));
-        if (!(filtered.depth[node] > 0)) continue;
+        if (!(filtered.depth[node] > 0) || !IsOpen(votes[node], remaining, options)) continue;
         const double z = filtered.depth[node];
         const Eigen::Vector3d x_in_supporter =
             supporter_from_reference *
@@ -148,6 +159,17 @@ void CountVotes(const PatchLattice& filtered, const SparseSurface& supporter, co
       }
     }
   });
+}
+
+absl::StatusOr<std::vector<Votes>> CollectVotes(const PatchLattice& filtered, int supporters, const SurfaceLoader& load,
+                                                const AcceptanceOptions& options, ThreadPool& pool) {
+  std::vector<Votes> votes(filtered.depth.size());
+  for (int i = 0; i < supporters; ++i) {
+    MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> supporter, load(i));
+    MW_CHECK(supporter != nullptr && supporter->camera_index != filtered.camera_index);
+    CountVotes(filtered, *supporter, supporters - i, options, votes, pool);
+  }
+  return votes;
 }
 
 void ClearNode(int64_t node, PatchLattice& surface) {
@@ -186,21 +208,65 @@ absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int
   MW_RETURN_IF_ERROR(options.Validate());
   AcceptanceResult result;
   result.patches_filtered = filtered.CountPatches();
-  std::vector<Votes> votes(filtered.depth.size());
-  for (int i = 0; i < supporters && result.patches_filtered > 0; ++i) {
-    MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> supporter, load(i));
-    MW_CHECK(supporter != nullptr && supporter->camera_index != filtered.camera_index);
-    ++result.supporters_loaded;
-    CountVotes(filtered, *supporter, options, votes, pool);
-  }
+  if (result.patches_filtered == 0) supporters = 0;
+  MW_ASSIGN_OR_RETURN(const std::vector<Votes> votes, CollectVotes(filtered, supporters, load, options, pool));
+  result.supporters_loaded = supporters;
   result.accepted = filtered;
   for (size_t node = 0; node < votes.size(); ++node) {
-    const bool accepted = votes[node].support >= options.k_a && votes[node].support > votes[node].conflicts;
-    if (!accepted) ClearNode(static_cast<int64_t>(node), result.accepted);
+    if (!IsAccepted(votes[node], options)) ClearNode(static_cast<int64_t>(node), result.accepted);
   }
   DropDanglingLinks(result.accepted);
   result.patches_accepted = result.accepted.CountPatches();
   return result;
+}
+
+absl::StatusOr<FinalSurface> JudgeAgain(const PatchLattice& filtered, const PatchLattice& accepted, int supporters,
+                                        const SurfaceLoader& load, const AcceptanceOptions& options, ThreadPool& pool) {
+  MW_RETURN_IF_ERROR(options.Validate());
+  MW_CHECK(accepted.depth.size() == filtered.depth.size());
+  MW_ASSIGN_OR_RETURN(const std::vector<Votes> votes, CollectVotes(filtered, supporters, load, options, pool));
+  FinalSurface surface = {.kept = accepted, .late = filtered};
+  for (size_t node = 0; node < votes.size(); ++node) {
+    const auto index = static_cast<int64_t>(node);
+    const bool stays = IsAccepted(votes[node], options);
+    if (!stays) ClearNode(index, surface.kept);
+    if (!stays || accepted.HasPatch(index)) ClearNode(index, surface.late);
+  }
+  DropDanglingLinks(surface.kept);
+  DropDanglingLinks(surface.late);
+  return surface;
+}
+
+int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface) {
+  const Lattice& lattice = surface.lattice;
+  const int64_t columns = lattice.columns;
+  std::vector<bool> visited(surface.depth.size(), false);
+  std::vector<int64_t> component;  // its nodes; those from `next` on are still to be expanded
+  int64_t removed = 0;
+  for (int64_t seed = 0; seed < lattice.nodes(); ++seed) {
+    if (!surface.HasPatch(seed) || visited[static_cast<size_t>(seed)]) continue;
+    component.assign(1, seed);
+    visited[static_cast<size_t>(seed)] = true;
+    const auto visit = [&](int64_t node) {
+      if (visited[static_cast<size_t>(node)]) return;
+      visited[static_cast<size_t>(node)] = true;
+      component.push_back(node);
+    };
+    const auto linked = [&](int64_t node, uint8_t link) {
+      return (surface.links[static_cast<size_t>(node)] & link) != 0;
+    };
+    for (size_t next = 0; next < component.size(); ++next) {
+      const int64_t node = component[next];
+      if (linked(node, PatchLattice::kLinkRight)) visit(node + 1);
+      if (linked(node, PatchLattice::kLinkDown)) visit(node + columns);
+      if (node % columns > 0 && linked(node - 1, PatchLattice::kLinkRight)) visit(node - 1);
+      if (node >= columns && linked(node - columns, PatchLattice::kLinkDown)) visit(node - columns);
+    }
+    if (static_cast<int64_t>(component.size()) >= min_patches) continue;
+    removed += static_cast<int64_t>(component.size());
+    for (const int64_t node : component) ClearNode(node, surface);
+  }
+  return removed;
 }
 
 }  // namespace meshwright

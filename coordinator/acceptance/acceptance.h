@@ -46,5 +46,21 @@ using SurfaceLoader = std::function<absl::StatusOr<std::shared_ptr<const SparseS
 absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int supporters, const SurfaceLoader& load,
                                                const AcceptanceOptions& options, ThreadPool& pool);
 
+// What a filtered surface comes to once every camera is committed.
+struct FinalSurface {
+  PatchLattice kept;  // M_r less the patches that as many cameras look through as support
+  PatchLattice late;  // what of F_r is not in M_r and has found its supporters since
+};
+
+// Ours: asks all cameras. M_r was accepted by the cameras committed before r; those behind it may look through it, and
+// what only they support (all that the first camera of a place saw) was not accepted at all. `supporters` are now all
+// that overlap r, `accepted` is M_r. The late patches repeat much of what later cameras were given anyway: they belong
+// behind all accepted surfaces, to close gaps.
+absl::StatusOr<FinalSurface> JudgeAgain(const PatchLattice& filtered, const PatchLattice& accepted, int supporters,
+                                        const SurfaceLoader& load, const AcceptanceOptions& options, ThreadPool& pool);
+
+// Removes patches of connected components (by links) with fewer than `min_patches`. Gives the number removed.
+int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface);
+
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

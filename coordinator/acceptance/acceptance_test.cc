@@ -87,7 +87,8 @@ std::vector<bool> SlowAcceptance(const PatchLattice& filtered, const std::vector
         const double detail = LevelOfDetail(filtered.camera, filtered.depth[node], filtered.lattice.step);
         const double z = supporter.camera.CamFromWorld(x).z();
         const double coarser = LevelOfDetail(supporter.camera, z, supporter.lattice.step);
-        const double radius = 3 * std::max(detail, std::min(coarser, 2 * detail));
+        const double radius =
+            AcceptanceOptions().support_radius_steps * std::max(detail, std::min(coarser, 2 * detail));
         if (z <= radius) continue;
         bool near = false;
         for (int r = 0; r < supporter.lattice.rows; ++r) {
@@ -140,6 +141,35 @@ TEST(Acceptance, EqualsTheDefinition) {
   }
   EXPECT_GT(accepted, filtered_patches / 10) << "the trials must be neither trivial";
   EXPECT_LT(accepted, filtered_patches * 9 / 10) << "nor the other";
+}
+
+// Judged by all cameras a filtered surface gives the same patches as if all had been there before: those that were
+// accepted stay with them, the others are late.
+TEST(Acceptance, JudgedAgainByAllCameras) {
+  std::mt19937 generator(5);
+  ThreadPool pool(2);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const PatchLattice filtered = RandomSurface(0, CameraAt({0, 0, 0}, 0, 40), 1, 0.4, generator);
+  std::vector<PatchLattice> all;
+  for (int i = 1; i <= 9; ++i) {
+    const Camera camera = CameraAt({uniform(generator), uniform(generator), uniform(generator)}, 0, 40);
+    all.push_back(RandomSurface(i, camera, 1, i <= 2 ? 0.4 : 0.02, generator));
+  }
+  const auto before = AcceptSurface(filtered, 2, LoaderOf(all), {}, pool);
+  const auto after = AcceptSurface(filtered, 9, LoaderOf(all), {}, pool);
+  const auto judged = JudgeAgain(filtered, before->accepted, 9, LoaderOf(all), {}, pool);
+  ASSERT_TRUE(judged.ok()) << judged.status();
+  int64_t outvoted = 0;
+  for (int64_t node = 0; node < filtered.lattice.nodes(); ++node) {
+    const bool was_accepted = before->accepted.HasPatch(node);
+    const bool is_accepted = after->accepted.HasPatch(node);
+    EXPECT_EQ(judged->kept.HasPatch(node), was_accepted && is_accepted) << node;
+    EXPECT_EQ(judged->late.HasPatch(node), !was_accepted && is_accepted) << node;
+    outvoted += was_accepted && !is_accepted ? 1 : 0;
+  }
+  EXPECT_GT(judged->kept.CountPatches(), 0);
+  EXPECT_GT(judged->late.CountPatches(), 0);
+  EXPECT_GT(outvoted, 0);
 }
 
 TEST(Acceptance, LinksStayWhereBothEndsDo) {

@@ -14,6 +14,7 @@
 #include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/base/files.h"
+#include "common/base/method_version.h"
 #include "common/blob/filesystem_blob_store.h"
 #include "common/image/encode.h"
 #include "common/scene/formats/export_colmap.h"
@@ -291,8 +292,8 @@ TEST_F(ReconstructionServiceTest, AWorkerWhoseWordIsWorthNothingHarmsNobody) {
 TEST_F(ReconstructionServiceTest, WhatWasBegunWithAnotherMethodWaitsForACoordinatorThatHasIt) {
   CreateAndStart("wall");
   RunWorker("w", 2, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
-  const size_t committed = store_->ListCommits("wall")->size();
   Open(kMethodVersion + 1);
+  const size_t committed = store_->ListCommits("wall")->size();
   const ConductorLease before = *store_->GetConductorLease("wall");
   absl::SleepFor(absl::Seconds(2));
   EXPECT_EQ(store_->GetConductorLease("wall")->epoch, before.epoch);
@@ -300,7 +301,7 @@ TEST_F(ReconstructionServiceTest, WhatWasBegunWithAnotherMethodWaitsForACoordina
   const v1::Reconstruction waiting = *service_->Get("wall");
   EXPECT_FALSE(IsOver(waiting.state())) << waiting.failure();
   ASSERT_GE(waiting.warnings_size(), 1);
-  EXPECT_THAT(waiting.warnings(0), HasSubstr("begun with version 1 of the method"));
+  EXPECT_THAT(waiting.warnings(0), HasSubstr(absl::StrCat("begun with version ", kMethodVersion, " of the method")));
   Open();
   RunWorker("w", 1000, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
   const v1::Reconstruction done = WaitFor("wall");

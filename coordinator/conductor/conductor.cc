@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -306,26 +307,27 @@ absl::StatusOr<std::shared_ptr<const SparseSurface>> Conductor::LoadSurface(cons
   return std::make_shared<const SparseSurface>(*std::move(surface));
 }
 
-// Section 3.7: what of F_r is supported by the filtered surfaces of enough cameras committed before becomes M_r.
-absl::StatusOr<Commit> Conductor::Accept(SequenceNumber sequence, CameraIndex camera,
-                                         const std::string& filtered_digest) {
-  MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> filtered, LoadSurface(filtered_digest, camera));
-  struct Supporter {
-    CameraIndex camera = 0;
-    std::string digest;
-    int64_t patches = 0;
-  };
-  std::vector<Supporter> supporters;
+// The largest filtered surfaces that overlap the camera's and were committed before `before`.
+std::vector<CommittedSurface::Supporter> Conductor::SupportersOf(CameraIndex camera, SequenceNumber before) const {
+  std::vector<CommittedSurface::Supporter> supporters;
   for (const CameraIndex other : overlaps_.Of(camera)) {
     const auto found = committed_.find(other);
-    if (found == committed_.end() || found->second.sequence >= sequence || found->second.filtered_digest.empty()) {
+    if (found == committed_.end() || found->second.sequence >= before || found->second.filtered_digest.empty()) {
       continue;
     }
     supporters.push_back({other, found->second.filtered_digest, found->second.filtered_patches});
   }
   KeepLargest(options_.max_surfaces, supporters);
+  return supporters;
+}
+
+// Section 3.7: what of F_r is supported by the filtered surfaces of enough cameras committed before becomes M_r.
+absl::StatusOr<Commit> Conductor::Accept(SequenceNumber sequence, CameraIndex camera,
+                                         const std::string& filtered_digest) {
+  MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> filtered, LoadSurface(filtered_digest, camera));
+  const std::vector<CommittedSurface::Supporter> supporters = SupportersOf(camera, sequence);
   const auto load = [&](int i) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    const Supporter& supporter = supporters[static_cast<size_t>(i)];
+    const CommittedSurface::Supporter& supporter = supporters[static_cast<size_t>(i)];
     absl::StatusOr<std::shared_ptr<const SparseSurface>> surface = LoadSurface(supporter.digest, supporter.camera);
     // It was committed: not the fault of the camera that is next.
     if (absl::IsInvalidArgument(surface.status())) surface = absl::DataLossError(surface.status().message());
@@ -406,6 +408,21 @@ std::vector<AcceptedSurface> Conductor::AcceptedSurfaces() const {
   }
   std::sort(surfaces.begin(), surfaces.end(),
             [](const AcceptedSurface& a, const AcceptedSurface& b) { return a.sequence < b.sequence; });
+  return surfaces;
+}
+
+std::vector<CommittedSurface> Conductor::CommittedSurfaces() const {
+  const MutexLock lock(mutex_);
+  std::vector<CommittedSurface> surfaces;
+  for (const auto& [camera, committed] : committed_) {
+    if (committed.filtered_digest.empty()) continue;
+    surfaces.push_back({.accepted = committed.accepted,
+                        .filtered_digest = committed.filtered_digest,
+                        .supporters = SupportersOf(camera, std::numeric_limits<SequenceNumber>::max())});
+  }
+  std::sort(surfaces.begin(), surfaces.end(), [](const CommittedSurface& a, const CommittedSurface& b) {
+    return a.accepted.sequence < b.accepted.sequence;
+  });
   return surfaces;
 }
 

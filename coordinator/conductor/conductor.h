@@ -31,6 +31,18 @@ namespace meshwright {
 // Bytes that a job takes at most when it is made smaller 0, 1, 2 ... times.
 using JobBytes = std::function<std::vector<int64_t>(const CameraJobSpec& spec)>;
 
+// A camera that is committed, and what of others there is to judge its surface by.
+struct CommittedSurface {
+  struct Supporter {
+    CameraIndex camera = 0;
+    std::string digest;  // of its F_i
+    int64_t patches = 0;
+  };
+  AcceptedSurface accepted;           // M_r; its digest is "" when nothing was accepted
+  std::string filtered_digest;        // F_r
+  std::vector<Supporter> supporters;  // of the cameras that overlap it, ascending
+};
+
 // Conducts one reconstruction: which camera is processed when (schedule), what it is given (targets, accepted
 // surfaces), which of its patches are accepted (section 3.7, Jancosek et al. 2009), in the one order of the order rule.
 // Everything that has happened is in the JobStore; opening replays it, so a conductor may die at any moment. It has no
@@ -73,6 +85,8 @@ class Conductor {
   bool finished() const;
   // In the order of commits, which is the order of the mesh.
   std::vector<AcceptedSurface> AcceptedSurfaces() const;
+  // Every committed camera that found something, in the order of commits, with supporters from before and after it.
+  std::vector<CommittedSurface> CommittedSurfaces() const;
 
   const FeasiblePairCounts& pair_counts() const { return pair_counts_; }
   FeasibilitySource feasibility_source() const { return feasibility_source_; }
@@ -101,6 +115,8 @@ class Conductor {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<const Assignment*> FindInFlight(SequenceNumber sequence) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CommitWhatIsNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::vector<CommittedSurface::Supporter> SupportersOf(CameraIndex camera, SequenceNumber before) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<Commit> Accept(SequenceNumber sequence, CameraIndex camera, const std::string& filtered_digest)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   SequenceNumber LastChoice() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

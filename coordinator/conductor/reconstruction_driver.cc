@@ -18,6 +18,7 @@
 #include "common/scene/scene_codec.h"
 #include "common/scene/view.h"
 #include "coordinator/conductor/accepted_mesh.h"
+#include "coordinator/conductor/final_surfaces.h"
 
 namespace meshwright {
 namespace {
@@ -278,17 +279,30 @@ absl::Status ReconstructionDriver::Join(const ReconstructionConfig& config, Oute
   return absl::IsFailedPrecondition(finished) ? Stopped() : finished;
 }
 
+absl::StatusOr<JoinedMeshCounts> ReconstructionDriver::TryToWriteMesh(const ReconstructionConfig& config,
+                                                                      const Conductor& conductor,
+                                                                      const std::string& path,
+                                                                      std::vector<AcceptedSurface>& surfaces) {
+  LostBlobNamer blobs(*environment_.blobs);
+  const auto put = [&](const std::string& bytes) { return referenced_blobs_.Put(bytes); };
+  MW_ASSIGN_OR_RETURN(surfaces, JudgeCommittedSurfaces(conductor.CommittedSurfaces(), config.conductor.acceptance,
+                                                       blobs, put, *environment_.pool));
+  return WriteAcceptedMesh(surfaces, blobs, config.join, offset_, path, *environment_.pool);
+}
+
 absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionConfig& config, OuterLoop& loop) {
   const std::string path = absl::StrCat(folders_.data, "/meshes/", id_, "-", epoch_, ".new");
   absl::StatusOr<JoinedMeshCounts> counts = absl::UnknownError("not tried");
   for (int attempt = 0; attempt < kMaxRepairsInARow && !counts.ok(); ++attempt) {
-    LostBlobNamer blobs(*environment_.blobs);
-    counts =
-        WriteAcceptedMesh(loop.conductor().AcceptedSurfaces(), blobs, config.join, offset_, path, *environment_.pool);
+    std::vector<AcceptedSurface> surfaces;
+    counts = TryToWriteMesh(config, loop.conductor(), path, surfaces);
     if (counts.ok()) break;
     const std::string lost = LostBlobOf(counts.status());
     if (lost.empty()) return counts.status();
-    MW_RETURN_IF_ERROR(Repair(loop, lost));
+    // What was judged is judged again with the next attempt; all else has its source.
+    const bool is_judged = std::any_of(surfaces.begin(), surfaces.end(),
+                                       [&](const AcceptedSurface& surface) { return surface.digest == lost; });
+    if (!is_judged) MW_RETURN_IF_ERROR(Repair(loop, lost));
   }
   MW_RETURN_IF_ERROR(counts.status());
   MW_ASSIGN_OR_RETURN(const FileFacts facts, FactsOf(path));

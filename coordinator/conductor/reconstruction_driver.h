@@ -79,6 +79,9 @@ class ReconstructionDriver {
   absl::StatusOr<std::unique_ptr<OuterLoop>> OpenLoop(const ReconstructionConfig& config);
   absl::Status RunJobs(OuterLoop& loop);
   absl::Status Join(const ReconstructionConfig& config, OuterLoop& loop);
+  // `surfaces` gets what the mesh is made of.
+  absl::StatusOr<JoinedMeshCounts> TryToWriteMesh(const ReconstructionConfig& config, const Conductor& conductor,
+                                                  const std::string& path, std::vector<AcceptedSurface>& surfaces);
   absl::StatusOr<StoredMesh> WriteMesh(const ReconstructionConfig& config, OuterLoop& loop);
   absl::Status Repair(OuterLoop& loop, const std::string& digest);
   absl::StatusOr<bool> RepairScene(const std::string& digest);

@@ -11,6 +11,7 @@
 
 #include "common/base/check.h"
 #include "common/base/clock.h"
+#include "common/base/method_version.h"
 #include "common/job/job_spec_codec.h"
 #include "coordinator/store/sqlite_job_store.h"
 
@@ -154,8 +155,8 @@ TEST_F(WorkerServiceTest, WorkersOfOtherMethodsGetNothingAndCostNoCamera) {
     EXPECT_EQ(Synchronize(silent).jobs_size(), 0);
   }
   ASSERT_EQ(service_->WarningsFor("a").size(), 1);
-  EXPECT_THAT(service_->WarningsFor("a")[0], HasSubstr("version 1 of the method"));
-  EXPECT_THAT(service_->WarningsFor("a")[0], HasSubstr("none told, 2"));
+  EXPECT_THAT(service_->WarningsFor("a")[0], HasSubstr(absl::StrCat("version ", kMethodVersion, " of the method")));
+  EXPECT_THAT(service_->WarningsFor("a")[0], HasSubstr(absl::StrCat("none told, ", kMethodVersion + 1)));
   EXPECT_EQ(Stored(1).failed_attempts, 0);
   EXPECT_EQ(Stored(1).losses, 0);
   EXPECT_EQ(Synchronize(Request("w")).jobs_size(), 1);

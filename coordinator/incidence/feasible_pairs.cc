@@ -29,36 +29,6 @@ void Collect(const std::vector<PairRow>& rows, FeasiblePairs& pairs) {
   }
 }
 
-double FeasibleShare(const CameraGeometry& a, const CameraProbes& probes_of_a, const CameraGeometry& b,
-                     const CameraProbes& probes_of_b, const PairLimits& limits) {
-  if (probes_of_a.in_world.empty()) return 0;
-  int feasible = 0;
-  for (const Eigen::Vector3d& probe : probes_of_a.in_world) {
-    if (SeesWithinDepths(b, probes_of_b, probe) && TestPoint(a, b, probe, limits) == PairOutcome::kFeasible) ++feasible;
-  }
-  return static_cast<double>(feasible) / static_cast<double>(probes_of_a.in_world.size());
-}
-
-void AddPairsByFrustumOverlap(const std::vector<CameraGeometry>& cameras, const PairLimits& limits,
-                              const FeasiblePairOptions& options, FeasiblePairs& pairs) {
-  std::vector<size_t> lonely;
-  for (size_t i = 0; i < cameras.size(); ++i) {
-    if (pairs.matrix.RowSum(static_cast<CameraIndex>(i)) < options.min_pairs_per_camera) lonely.push_back(i);
-  }
-  for (const size_t i : lonely) {
-    for (size_t j = 0; j < cameras.size(); ++j) {
-      if (i == j || pairs.matrix.Get(static_cast<CameraIndex>(i), static_cast<CameraIndex>(j))) continue;
-      if (!FrustaMeet(pairs.probes[i], pairs.probes[j])) continue;
-      if (FeasibleShare(cameras[i], pairs.probes[i], cameras[j], pairs.probes[j], limits) <
-          options.min_frustum_overlap) {
-        continue;
-      }
-      pairs.matrix.Set(static_cast<CameraIndex>(i), static_cast<CameraIndex>(j));
-      ++pairs.counts.by_frustum_overlap;
-    }
-  }
-}
-
 std::string NoPairMessage(size_t cameras, const FeasiblePairs& pairs, const FeasiblePairOptions& options) {
   const FeasiblePairCounts& counts = pairs.counts;
   const std::string angles =
@@ -123,6 +93,7 @@ void AddCounts(const FeasiblePairCounts& row, FeasiblePairCounts& sum) {
   sum.angle_too_large += row.angle_too_large;
   sum.scale_differs += row.scale_differs;
   sum.outside_depths += row.outside_depths;
+  sum.by_common_view += row.by_common_view;
 }
 
 absl::Status FeasiblePairOptions::Validate() const {
@@ -136,11 +107,8 @@ absl::Status FeasiblePairOptions::Validate() const {
   if (!(min_scale_ratio >= 0 && min_scale_ratio <= 1)) {
     return OutOfRange("min_scale_ratio", min_scale_ratio, "0..1");
   }
-  if (min_pairs_per_camera < 0) {
-    return OutOfRange("min_pairs_per_camera", min_pairs_per_camera, ">= 0");
-  }
-  if (!(min_frustum_overlap > 0 && min_frustum_overlap <= 1)) {
-    return OutOfRange("min_frustum_overlap", min_frustum_overlap, "0..1");
+  if (!(min_common_view > 0 && min_common_view <= 1)) {
+    return OutOfRange("min_common_view", min_common_view, "0..1");
   }
   return absl::OkStatus();
 }
@@ -159,8 +127,7 @@ absl::StatusOr<FeasiblePairs> FindFeasiblePairs(const std::vector<Camera>& camer
   } else {
     pairs.source = FeasibilitySource::kOpticalAxes;
     pairs.probes = ProbesFromDepths(geometries, DepthsFromAxes(geometries, limits, pool));
-    Collect(PairsFromAxes(geometries, pairs.probes, limits, pool), pairs);
-    AddPairsByFrustumOverlap(geometries, limits, options, pairs);
+    Collect(PairsWithoutPoints(geometries, pairs.probes, limits, options.min_common_view, pool), pairs);
   }
   if (pairs.matrix.CountBits() == 0) {
     return absl::FailedPreconditionError(NoPairMessage(cameras.size(), pairs, options));

@@ -17,14 +17,12 @@ namespace meshwright {
 // Which cameras form a feasible pair: section 3.2 of Jancosek et al. 2009.
 struct FeasiblePairOptions {
   int min_common_points = 10;    // sparse points, >= 1 (section 3.2)
-  double min_angle_deg = 5;      // apical angle, degrees, 0..max_angle_deg (section 3.2)
+  double min_angle_deg = 2;      // apical angle, degrees, 0..max_angle_deg (section 3.2: 5)
   double max_angle_deg = 50;     // apical angle, degrees, min_angle_deg..180 (section 3.2)
   double min_scale_ratio = 0.8;  // smaller by larger size of a small ball at the point, 0..1 (section 3.2)
-  // Without sparse points: a camera with fewer pairs than this gets more by frustum overlap; >= 0. Two neighbours are
-  // the least with which a photo-consistency is a mean.
-  int min_pairs_per_camera = 2;
-  // Share of a camera's probes that the other must see within the limits for a pair by frustum overlap, 0..1.
-  double min_frustum_overlap = 0.25;
+  // Without sparse points: share of one camera's probes (camera_probes.h) that the other must see within the limits,
+  // 0..1.
+  double min_common_view = 0.25;
 
   absl::Status Validate() const;
 };
@@ -42,7 +40,7 @@ struct FeasiblePairCounts {
   int64_t angle_too_large = 0;
   int64_t scale_differs = 0;
   int64_t outside_depths = 0;
-  int64_t by_frustum_overlap = 0;    // of the feasible ones: failed the axes' test, accepted by the fallback
+  int64_t by_common_view = 0;        // of the feasible ones: failed the axes' test, see a common part of space
   int64_t cameras_without_pair = 0;  // cameras that will never be processed
 };
 
@@ -66,10 +64,10 @@ struct FeasiblePairs {
 // pair
 //   counts only if its axes meet between a third and three times that depth for both cameras. Without it, a street of
 //   photographs taken sideways would pair each with those a kilometre further, whose axes it meets at the horizon.
-// - The axes of two cameras on a facade may miss each other's images although they see the same wall. So a camera left
-//   with fewer than min_pairs_per_camera pairs is tested once more on probes, points on a grid of its rays around its
-//   typical depth (if it has none, around that of the cameras nearest to it); see camera_probes.h. A pair is added when
-//   min_frustum_overlap of the probes lie in both images within the limits.
+// - Neighbours in a walk along a facade or through a room look in parallel: their axes meet nowhere, or outside the
+//   images, although they see the same walls. So a pair is feasible too when either camera sees min_common_view of the
+//   other's probes (points on a grid of its rays around its typical depth, or around that of the cameras nearest to it
+//   if it has none; camera_probes.h) within the limits.
 // Cameras that all look in parallel have no transversals and no depths: they need sparse points.
 //
 // FailedPrecondition when no pair is feasible: the message counts the failed tests and names the option to change.

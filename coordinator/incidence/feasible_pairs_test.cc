@@ -65,7 +65,7 @@ TEST(FeasiblePairs, OnARingTheAngleDecides) {
     for (CameraIndex i = 0; i < 90; ++i) {
       for (CameraIndex j = 0; j < 90; ++j) {
         const int steps = std::min((i - j + 90) % 90, (j - i + 90) % 90);
-        EXPECT_EQ(pairs->matrix.Get(i, j), steps >= 2 && steps <= 12) << i << ' ' << j;
+        EXPECT_EQ(pairs->matrix.Get(i, j), steps >= 1 && steps <= 12) << i << ' ' << j;
       }
     }
   }
@@ -91,8 +91,8 @@ TEST(FeasiblePairs, ScaleDecides) {
     cameras[1] = CameraLookingAt(closer * Eigen::Vector3d(5 * std::cos(0.35), 5 * std::sin(0.35), 0), {0, 0, 0});
     const std::vector<SparsePoint> points = PointsSeenBy(cameras, 30, 0.01);
     for (const bool with_points : {false, true}) {
-      const absl::StatusOr<FeasiblePairs> pairs = FindFeasiblePairs(
-          cameras, with_points ? points : std::vector<SparsePoint>(), {.min_pairs_per_camera = 0}, pool);
+      const absl::StatusOr<FeasiblePairs> pairs =
+          FindFeasiblePairs(cameras, with_points ? points : std::vector<SparsePoint>(), {}, pool);
       EXPECT_EQ(pairs.ok(), closer > 0.8);
       if (!pairs.ok()) {
         EXPECT_THAT(pairs.status().ToString(), HasSubstr("1 differ in scale"));
@@ -142,18 +142,37 @@ TEST(FeasiblePairs, NothingFeasibleIsSaidWithCounts) {
   EXPECT_EQ(FindFeasiblePairs({}, {}, {}, pool).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
-TEST(FeasiblePairs, FrustumOverlapHelpsWhoseAxesMissEachOther) {
+TEST(FeasiblePairs, NeighboursThatLookInParallelSeeACommonPart) {
   ThreadPool pool(1);
   // Two cameras that look at a wall at y = 10 and meet on it; a third beside them that looks in parallel to the first.
   const std::vector<Camera> cameras = {CameraLookingAt({0, 0, 0}, {0, 10, 0}), CameraLookingAt({2, 0, 0}, {0, 10, 0}),
                                        CameraLookingAt({-2, 0, 0}, {-2, 10, 0})};
-  const absl::StatusOr<FeasiblePairs> without = FindFeasiblePairs(cameras, {}, {.min_pairs_per_camera = 0}, pool);
-  ASSERT_TRUE(without.ok()) << without.status();
-  EXPECT_FALSE(without->matrix.Get(0, 2));
-  const absl::StatusOr<FeasiblePairs> with = FindFeasiblePairs(cameras, {}, {}, pool);
-  ASSERT_TRUE(with.ok()) << with.status();
-  EXPECT_TRUE(with->matrix.Get(0, 2));
-  EXPECT_GT(with->counts.by_frustum_overlap, 0);
+  const absl::StatusOr<FeasiblePairs> pairs = FindFeasiblePairs(cameras, {}, {}, pool);
+  ASSERT_TRUE(pairs.ok()) << pairs.status();
+  EXPECT_TRUE(pairs->matrix.Get(0, 2)) << "although their axes meet nowhere";
+  EXPECT_GT(pairs->counts.by_common_view, 0);
+}
+
+// A walk around a room that looks outwards: each camera with the ones beside it, none with those that see another wall.
+TEST(FeasiblePairs, AWalkThroughARoomPairsNeighbours) {
+  ThreadPool pool(2);
+  std::vector<Camera> cameras;
+  constexpr int kCameras = 40;
+  for (int i = 0; i < kCameras; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kCameras;
+    const double yaw = angle + (i % 2 == 0 ? 0.2 : -0.2);
+    const Eigen::Vector3d center(2 * std::cos(angle), 2 * std::sin(angle), 0);
+    cameras.push_back(CameraLookingAt(center, center + Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0)));
+  }
+  const absl::StatusOr<FeasiblePairs> pairs = FindFeasiblePairs(cameras, {}, {}, pool);
+  ASSERT_TRUE(pairs.ok()) << pairs.status();
+  EXPECT_EQ(Sum(pairs->counts), kCameras * (kCameras - 1) / 2);
+  for (CameraIndex i = 0; i < kCameras; ++i) {
+    EXPECT_TRUE(pairs->matrix.Get(i, (i + 2) % kCameras)) << i << ": they look in nearly the same direction";
+    for (const CameraIndex j : pairs->matrix.Neighbours(i)) {
+      EXPECT_LE(std::min((i - j + kCameras) % kCameras, (j - i + kCameras) % kCameras), kCameras / 4);
+    }
+  }
 }
 
 TEST(FeasiblePairs, AxesThatMeetAtTheHorizonDoNotCount) {
@@ -200,8 +219,7 @@ TEST(FeasiblePairs, OptionsNameWhatIsWrong) {
               HasSubstr("min_common_points is 0, expected >= 1"));
   EXPECT_FALSE(FeasiblePairOptions{.min_angle_deg = 60}.Validate().ok());
   EXPECT_FALSE(FeasiblePairOptions{.min_scale_ratio = 1.5}.Validate().ok());
-  EXPECT_FALSE(FeasiblePairOptions{.min_pairs_per_camera = -1}.Validate().ok());
-  EXPECT_FALSE(FeasiblePairOptions{.min_frustum_overlap = 0}.Validate().ok());
+  EXPECT_FALSE(FeasiblePairOptions{.min_common_view = 0}.Validate().ok());
 }
 
 }  // namespace

@@ -31,10 +31,11 @@ std::vector<PairRow> PairsFromPoints(const std::vector<CameraGeometry>& cameras,
 std::vector<double> DepthsFromAxes(const std::vector<CameraGeometry>& cameras, const PairLimits& limits,
                                    ThreadPool& pool);
 
-// The transversal's test, with its midpoint within the depths of both cameras' probes (see FindFeasiblePairs); by the
-// transversal alone when no camera has probes.
-std::vector<PairRow> PairsFromAxes(const std::vector<CameraGeometry>& cameras, const std::vector<CameraProbes>& probes,
-                                   const PairLimits& limits, ThreadPool& pool);
+// The transversal's test, with its midpoint within the depths of both cameras' probes, or enough of either camera's
+// probes in both images (see FindFeasiblePairs); by the transversal alone when no camera has probes.
+std::vector<PairRow> PairsWithoutPoints(const std::vector<CameraGeometry>& cameras,
+                                        const std::vector<CameraProbes>& probes, const PairLimits& limits,
+                                        double min_common_view, ThreadPool& pool);
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -27,6 +27,29 @@ bool WithinDepths(const CameraGeometry& camera, const CameraProbes& probes, cons
   return depth >= probes.near_depth && depth <= probes.far_depth;
 }
 
+PairOutcome TestAxes(const CameraGeometry& a, const CameraProbes& probes_of_a, const CameraGeometry& b,
+                     const CameraProbes& probes_of_b, const PairLimits& limits, bool depths_known) {
+  Eigen::Vector3d midpoint;
+  const PairOutcome outcome = TestTransversal(a, b, limits, midpoint);
+  if (outcome == PairOutcome::kFeasible && depths_known &&
+      !(WithinDepths(a, probes_of_a, midpoint) && WithinDepths(b, probes_of_b, midpoint))) {
+    return PairOutcome::kOutsideDepths;
+  }
+  return outcome;
+}
+
+// Whether `b` sees `min_share` of the probes of `a`, under a useful angle and at about the same scale.
+bool HaveCommonView(const CameraGeometry& a, const CameraProbes& probes_of_a, const CameraGeometry& b,
+                    const CameraProbes& probes_of_b, const PairLimits& limits, double min_share) {
+  const double needed = min_share * static_cast<double>(probes_of_a.in_world.size());
+  int common = 0;
+  for (const Eigen::Vector3d& probe : probes_of_a.in_world) {
+    if (!SeesWithinDepths(b, probes_of_b, probe) || TestPoint(a, b, probe, limits) != PairOutcome::kFeasible) continue;
+    if (++common >= needed) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::vector<double> DepthsFromAxes(const std::vector<CameraGeometry>& cameras, const PairLimits& limits,
@@ -73,8 +96,9 @@ std::vector<double> DepthsFromAxes(const std::vector<CameraGeometry>& cameras, c
   return depths;
 }
 
-std::vector<PairRow> PairsFromAxes(const std::vector<CameraGeometry>& cameras, const std::vector<CameraProbes>& probes,
-                                   const PairLimits& limits, ThreadPool& pool) {
+std::vector<PairRow> PairsWithoutPoints(const std::vector<CameraGeometry>& cameras,
+                                        const std::vector<CameraProbes>& probes, const PairLimits& limits,
+                                        double min_common_view, ThreadPool& pool) {
   std::vector<PairRow> rows(cameras.size());
   // Borrowing gives all cameras probes or none.
   const bool depths_known = !probes.empty() && !probes.front().in_world.empty();
@@ -83,11 +107,12 @@ std::vector<PairRow> PairsFromAxes(const std::vector<CameraGeometry>& cameras, c
       for (size_t j = i + 1; j < cameras.size(); ++j) {
         PairOutcome outcome = PairOutcome::kOutsideDepths;
         if (!depths_known || FrustaMeet(probes[i], probes[j])) {
-          Eigen::Vector3d midpoint;
-          outcome = TestTransversal(cameras[i], cameras[j], limits, midpoint);
-          if (outcome == PairOutcome::kFeasible && depths_known &&
-              !(WithinDepths(cameras[i], probes[i], midpoint) && WithinDepths(cameras[j], probes[j], midpoint))) {
-            outcome = PairOutcome::kOutsideDepths;
+          outcome = TestAxes(cameras[i], probes[i], cameras[j], probes[j], limits, depths_known);
+          if (outcome != PairOutcome::kFeasible && depths_known &&
+              (HaveCommonView(cameras[i], probes[i], cameras[j], probes[j], limits, min_common_view) ||
+               HaveCommonView(cameras[j], probes[j], cameras[i], probes[i], limits, min_common_view))) {
+            outcome = PairOutcome::kFeasible;
+            ++rows[i].counts.by_common_view;
           }
         }
         CountOutcome(outcome, rows[i].counts);

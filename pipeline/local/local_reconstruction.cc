@@ -30,6 +30,7 @@
 #include "common/scene/view.h"
 #include "coordinator/conductor/accepted_mesh.h"
 #include "coordinator/conductor/conductor_lease.h"
+#include "coordinator/conductor/final_surfaces.h"
 #include "coordinator/conductor/outer_loop.h"
 #include "worker/job_input/view_cache.h"
 
@@ -83,14 +84,14 @@ FileStamp StampOf(const std::string& path) {
   return {fs::file_size(path, error), fs::last_write_time(path, error)};
 }
 
-// NNNN_name.ply, in the order of commits.
-std::string PartName(const Scene& scene, const AcceptedSurface& surface) {
+// NNNN_name.ply, in the order of commits; what was accepted at the end only is a part of its own.
+std::string PartName(const Scene& scene, const AcceptedSurface& surface, bool is_late) {
   std::string name = fs::path(scene.views[static_cast<size_t>(surface.camera)].name).stem().string();
   for (char& c : name) {
     const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-';
     if (!plain) c = '_';
   }
-  return absl::StrFormat("%04d_%s.ply", surface.sequence, name);
+  return absl::StrFormat("%04d_%s%s.ply", surface.sequence, name, is_late ? "_late" : "");
 }
 
 absl::Status MakePartsFolder(const std::string& path) {
@@ -102,9 +103,14 @@ absl::Status MakePartsFolder(const std::string& path) {
 
 absl::Status WriteParts(const Scene& scene, const std::vector<AcceptedSurface>& surfaces, BlobStore& blobs,
                         const std::string& folder) {
+  SequenceNumber previous = 0;
+  bool is_late = false;  // they come behind the others, in the order of commits too
   for (const AcceptedSurface& accepted : surfaces) {
+    is_late = is_late || accepted.sequence <= previous;
+    previous = accepted.sequence;
     MW_ASSIGN_OR_RETURN(const PatchLattice surface, LoadAcceptedSurface(blobs, accepted));
-    MW_RETURN_IF_ERROR(WriteSurfacePart(surface, scene.offset, absl::StrCat(folder, "/", PartName(scene, accepted))));
+    MW_RETURN_IF_ERROR(
+        WriteSurfacePart(surface, scene.offset, absl::StrCat(folder, "/", PartName(scene, accepted, is_late))));
   }
   return absl::OkStatus();
 }
@@ -252,7 +258,14 @@ class LocalReconstruction {
   }
 
   absl::StatusOr<Json> WriteResults() {
-    const std::vector<AcceptedSurface> surfaces = loop_->conductor().AcceptedSurfaces();
+    const std::vector<CommittedSurface> committed = loop_->conductor().CommittedSurfaces();
+    Tell(LocalStage::kJudging, 0, static_cast<int>(committed.size()));
+    MW_ASSIGN_OR_RETURN(
+        const std::vector<AcceptedSurface> surfaces,
+        JudgeCommittedSurfaces(
+            committed, options_.conductor.acceptance, *blobs_,
+            [&](const std::string& bytes) { return blobs_->Put(bytes); }, pool_,
+            [&](int judged) { Tell(LocalStage::kJudging, judged, static_cast<int>(committed.size())); }));
     Tell(LocalStage::kJoining, 0, static_cast<int>(surfaces.size()));
     MW_ASSIGN_OR_RETURN(Json cameras,
                         MakeCamerasReport(scene_, work_->store(), WorkFolder::kReconstructionId, &totals_));
@@ -366,6 +379,8 @@ std::string NameOf(LocalStage stage) {
       return "finding pairs";
     case LocalStage::kCameras:
       return "cameras";
+    case LocalStage::kJudging:
+      return "judging surfaces again";
     case LocalStage::kJoining:
       return "joining the mesh";
     case LocalStage::kTexturing:

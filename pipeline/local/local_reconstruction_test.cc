@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <mutex>
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -13,6 +14,7 @@
 #include "common/base/bad_input.h"
 #include "common/base/check.h"
 #include "common/base/files.h"
+#include "common/base/method_version.h"
 #include "common/image/encode.h"
 
 namespace meshwright {
@@ -178,8 +180,9 @@ TEST_F(LocalReconstructionTest, GoesOnAfterAPhotographWasGoneForAWhile) {
   EXPECT_LT(jobs_, 2 * jobs_of_a_whole_run);
 }
 
-// Work folders of the version before: nothing is leased in them, nobody conducts, and no job says what it needs.
-TEST_F(LocalReconstructionTest, GoesOnInAWorkFolderOfTheVersionBefore) {
+// Work folders of 0.1.0: nothing is leased in them, nobody conducts, and no job says what it needs. They are of the
+// method's first version, so they are refused; one of today's in that state goes on.
+TEST_F(LocalReconstructionTest, GoesOnInAWorkFolderWithoutLeasesIfTheMethodIsTheSame) {
   ASSERT_TRUE(Run(Settings("whole", 1)).ok());
   const std::string as_before =
       "DELETE FROM conductor_leases; PRAGMA user_version = 4;"
@@ -188,6 +191,11 @@ TEST_F(LocalReconstructionTest, GoesOnInAWorkFolderOfTheVersionBefore) {
       "  leased_at = NULL, memory_bytes = 0, last_ending = 'lost', last_ended_at = 5 WHERE state = 'assigned';";
   ASSERT_FALSE(RunUntil(4, Settings("half", 1)).ok());
   RunSql(folder_ + "/half.work/state.sqlite", as_before);
+  const auto other_method = Run(Settings("half", 2));
+  ASSERT_TRUE(absl::IsFailedPrecondition(other_method.status())) << other_method.status();
+  EXPECT_THAT(std::string(other_method.status().message()), testing::HasSubstr("begun with version 1 of the method"));
+  const std::string of_this_method = absl::StrCat("UPDATE reconstructions SET method_version = ", kMethodVersion);
+  RunSql(folder_ + "/half.work/state.sqlite", of_this_method);
   const auto half = Run(Settings("half", 2));
   ASSERT_TRUE(half.ok()) << half.status();
   EXPECT_GT((*half)["process"]["cameras_done_before"], 0);
@@ -201,6 +209,8 @@ TEST_F(LocalReconstructionTest, GoesOnInAWorkFolderOfTheVersionBefore) {
          as_before + "UPDATE reconstructions SET state = 'done', finished_at = 5;");
   fs::remove(folder_ + "/done.ply");
   jobs_ = 0;
+  ASSERT_FALSE(Run(settings).ok());
+  RunSql(folder_ + "/done.work/state.sqlite", of_this_method);
   const auto done = Run(settings);
   ASSERT_TRUE(done.ok()) << done.status();
   EXPECT_EQ(jobs_, 0);
@@ -209,6 +219,8 @@ TEST_F(LocalReconstructionTest, GoesOnInAWorkFolderOfTheVersionBefore) {
   // One whose jobs are not described in the store cannot go on, and says so.
   ASSERT_FALSE(RunUntil(4, Settings("old", 1)).ok());
   RunSql(folder_ + "/old.work/state.sqlite", as_before + "UPDATE camera_jobs SET spec = '' WHERE state = 'assigned';");
+  ASSERT_FALSE(Run(Settings("old", 1)).ok());
+  RunSql(folder_ + "/old.work/state.sqlite", of_this_method);
   const auto old = Run(Settings("old", 1));
   EXPECT_TRUE(absl::IsDataLoss(old.status())) << old.status();
   EXPECT_THAT(std::string(old.status().message()), testing::HasSubstr("specification"));

@@ -13,6 +13,7 @@
 
 #include "pipeline/options/options_json.h"
 
+#include "common/base/method_version.h"
 #include "common/base/status_macros.h"
 #include "common/blob/filesystem_blob_store.h"
 #include "common/json/parse_json.h"
@@ -91,6 +92,9 @@ absl::Status WorkFolder::OpenStores(const std::string& scene_digest, const std::
     MW_ASSIGN_OR_RETURN(const auto now, ParseJson<nlohmann::ordered_json>(options_json));
     const std::vector<std::string> options = DescribeDifferences(*before, now);
     differences.insert(differences.end(), options.begin(), options.end());
+  }
+  if (differences.empty() && stored->method_version != kMethodVersion) {
+    differences.push_back(DescribeMethods(stored->method_version, kMethodVersion));
   }
   if (!differences.empty()) {
     return absl::FailedPreconditionError(

@@ -92,11 +92,14 @@ nlohmann::ordered_json ToJson(const ReconstructionOptions& options) {
   return json;
 }
 
+std::string DescribeMethods(int64_t before, int64_t now) {
+  return absl::StrCat("it was begun with version ", before, " of the method, this program has version ", now);
+}
+
 std::vector<std::string> DescribeDifferences(const nlohmann::ordered_json& before, const nlohmann::ordered_json& now) {
   std::vector<std::string> differences;
   if (MethodOf(before) != MethodOf(now)) {
-    differences.push_back(absl::StrCat("it was begun with version ", MethodOf(before),
-                                       " of the method, this program has version ", MethodOf(now)));
+    differences.push_back(DescribeMethods(MethodOf(before), MethodOf(now)));
   }
   for (const auto& [name, value] : now.items()) {
     if (name == kMethod) continue;

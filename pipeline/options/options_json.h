@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,11 +15,14 @@ namespace meshwright {
 // InvalidArgument begins with "options_json: ", then names the option, its value and the values allowed.
 absl::StatusOr<ReconstructionOptions> ParseOptions(const std::string& options_json);
 
-// {"method": 1, "max-image-size": 0, ...}: every option and the method's version. ParseOptions takes it.
+// {"method": 2, "max-image-size": 0, ...}: every option and the method's version. ParseOptions takes it.
 nlohmann::ordered_json ToJson(const ReconstructionOptions& options);
 
 // "--window was 3, now 1", one for each difference between two results of ToJson.
 std::vector<std::string> DescribeDifferences(const nlohmann::ordered_json& before, const nlohmann::ordered_json& now);
+
+// The words for a reconstruction that was begun with another version of the method.
+std::string DescribeMethods(int64_t before, int64_t now);
 
 // The answer of GET /v1/options: {"options": [...]}, each with name, group, type, unit, default, minimum, maximum,
 // documentation and tradeOff.

@@ -56,7 +56,7 @@ struct PatchScorer::Target {
 
 PatchScorer::PatchScorer(ScoredView reference, std::vector<ScoredView> targets, const Options& options,
                          const std::optional<OrientedBox>& region)
-    : reference_(std::move(reference)), targets_(std::move(targets)), options_(options) {
+    : reference_(std::move(reference)), targets_(std::move(targets)), options_(options), backdrop_(*reference_.grey) {
   MW_CHECK(options_.window_radius >= 1 && options_.window_radius <= 7);
   const int side = 2 * options_.window_radius + 1;
   samples_ = side * side;
@@ -101,6 +101,7 @@ void PatchScorer::MakeWindow(int x, int y, Window& window) const {
   window.usable = false;
   window.sigma = 0;
   if (x < radius || y < radius || x + radius >= image.width() || y + radius >= image.height()) return;
+  if (backdrop_.Covers(x, y)) return;
   const IgnoredPixels& ignored = image.ignored();
   if (ignored.At(x, y) || !SetRange(x, y, window)) return;
   const bool has_ignored = ignored.AnyIn(x - radius, y - radius, x + radius, y + radius);

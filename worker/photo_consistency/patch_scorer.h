@@ -12,6 +12,7 @@
 #include "common/geometry/camera.h"
 #include "common/geometry/oriented_box.h"
 #include "common/image/sampling_image.h"
+#include "worker/photo_consistency/backdrop.h"
 
 namespace meshwright {
 
@@ -76,7 +77,7 @@ class PatchScorer {
     float sigma = 0;     // grey levels
     float min_w = 0;     // inverse depths that the region has on the centre's ray, 1 / scene units
     float max_w = 0;
-    bool usable = false;  // inside the image and the region, its centre not ignored, and textured
+    bool usable = false;  // inside the image and the region, its centre not ignored, textured, not of a black backdrop
   };
   void MakeWindow(int x, int y, Window& window) const;
 
@@ -99,6 +100,7 @@ class PatchScorer {
   std::vector<ScoredView> targets_;
   std::optional<OrientedBox> region_in_reference_;
   Options options_;
+  Backdrop backdrop_;  // of the reference
   std::vector<Target> geometry_;
   int samples_ = 0;         // (2 s + 1)^2
   int padded_samples_ = 0;  // rounded up to whole groups of the kernel
