@@ -38,6 +38,8 @@ void PrintReconstruction(const v1::Reconstruction& reconstruction) {
   if (reconstruction.state() == v1::RECONSTRUCTION_STATE_DONE) {
     std::printf(" %s vertices, %s faces", FormatCount(progress.vertices()).c_str(),
                 FormatCount(progress.faces()).c_str());
+  } else if (!reconstruction.stage().empty()) {
+    std::printf(" %s", reconstruction.stage().c_str());
   } else if (progress.cameras_total() > 0) {
     std::printf(" cameras %d/%d, %d with workers", progress.cameras_committed(), progress.cameras_total(),
                 progress.jobs_leased());
@@ -179,6 +181,7 @@ Json ToJson(const v1::Reconstruction& reconstruction) {
   json["id"] = reconstruction.id();
   json["state"] = NameOf(reconstruction.state());
   if (!reconstruction.failure().empty()) json["failure"] = reconstruction.failure();
+  if (!reconstruction.stage().empty()) json["stage"] = reconstruction.stage();
   json["cameras"] = {{"total", progress.cameras_total()},
                      {"committed", progress.cameras_committed()},
                      {"skipped", progress.cameras_skipped()},
@@ -196,11 +199,16 @@ int WatchUntilOver(const ServiceArguments& arguments, ServiceClient& client, con
   v1::Reconstruction last;
   Stopwatch since_answer;
   const auto tell = [&](const v1::Reconstruction& now) {
-    const bool news =
-        now.state() != last.state() || now.progress().cameras_committed() != last.progress().cameras_committed();
+    const bool news = now.state() != last.state() ||
+                      now.progress().cameras_committed() != last.progress().cameras_committed() ||
+                      now.stage() != last.stage();
     last = now;
     since_answer = Stopwatch();
     if (arguments.output.quiet || !news) return;
+    if (!now.stage().empty()) {
+      std::fprintf(stderr, "%s: %s\n", id.c_str(), now.stage().c_str());
+      return;
+    }
     std::fprintf(stderr, "%s: %s, cameras %d/%d\n", id.c_str(), NameOf(now.state()).c_str(),
                  now.progress().cameras_committed(), now.progress().cameras_total());
   };

@@ -11,10 +11,10 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include "pipeline/cameras/photograph_folder.h"
 #include "pipeline/options/option_table.h"
 #include "pipeline/options/options_json.h"
 
-#include "cli/camera_stage.h"
 #include "cli/commands.h"
 #include "cli/mesh_output.h"
 #include "cli/reconstruction_flags.h"
@@ -33,7 +33,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kExamples[] = R"(Examples:
-  meshwright submit photographs -o mesh.ply         # estimate their cameras here, upload, wait, download the mesh
+  meshwright submit photographs -o mesh.ply         # upload them, a worker with COLMAP estimates their cameras; wait
   meshwright submit my-scene -o mesh.ply            # upload it, wait, download the mesh
   meshwright submit my-scene --id first-try         # upload it; then: meshwright watch first-try
   meshwright submit file:campaign/7 --wait          # a folder below the coordinator's --scene-root)";
@@ -139,18 +139,15 @@ absl::Status Upload(const Arguments& arguments, const std::vector<std::string>& 
   return absl::OkStatus();
 }
 
-// The scene that COLMAP makes of photographs stays beside them: submitting them again need not wait for it.
-int EstimateCamerasFirst(Arguments& arguments) {
-  fs::path photographs = fs::path(arguments.scene.path).lexically_normal();
-  if (!photographs.has_filename()) photographs = photographs.parent_path();
-  CameraEstimationSettings settings;
-  settings.photographs = photographs.string();
-  settings.scene_folder = photographs.string() + ".cameras";
-  settings.threads = AvailableCores();
-  CameraEstimate estimate;
-  const int code = RunCameraStage(settings, arguments.service.output, &estimate);
-  arguments.scene.path = settings.scene_folder;
-  return code;
+// A scene, or photographs whose cameras a worker will estimate.
+absl::Status CheckScene(const Arguments& arguments) {
+  if (!LacksCameras(arguments.scene)) return LoadScene(arguments.scene).status();
+  MW_ASSIGN_OR_RETURN(const PhotographFolder folder, ListPhotographs(arguments.scene.path));
+  if (!arguments.service.output.quiet) {
+    std::fprintf(stderr, "%d photographs without cameras: a worker with COLMAP will estimate them\n",
+                 static_cast<int>(folder.photographs.size()));
+  }
+  return absl::OkStatus();
 }
 
 int Submit(Arguments& arguments) {
@@ -164,13 +161,10 @@ int Submit(Arguments& arguments) {
   }
   const bool by_reference = absl::StartsWith(arguments.scene.path, kByReference);
   if (arguments.id.empty()) arguments.id = DrawId(arguments.scene.path);
-  if (!by_reference && LacksCameras(arguments.scene)) {
-    if (const int code = EstimateCamerasFirst(arguments); code != kExitDone) return code;
-  }
   std::vector<std::string> files;
   if (!by_reference) {
     // Better known here and now than after it was uploaded.
-    if (const auto scene = LoadScene(arguments.scene); !scene.ok()) return Fail(scene.status());
+    if (const absl::Status usable = CheckScene(arguments); !usable.ok()) return Fail(usable);
     const absl::StatusOr<std::vector<std::string>> listed = FilesOf(arguments.scene.path);
     if (!listed.ok()) return Fail(listed.status());
     files = *listed;
@@ -216,8 +210,8 @@ void AddSubmitCommand(CLI::App& program, Run& run) {
   command
       .add_option(
           "SCENE", arguments->scene.path,
-          "folder with photographs and their cameras, to be uploaded; without cameras COLMAP estimates them here, into "
-          "SCENE.cameras/; or file:FOLDER below the coordinator's roots")
+          "folder with photographs and their cameras, to be uploaded; without cameras a worker with COLMAP estimates "
+          "them; or file:FOLDER below the coordinator's roots")
       ->required();
   command.add_option(
       "--id", arguments->id,

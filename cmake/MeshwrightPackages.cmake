@@ -87,11 +87,11 @@ Multi-View Stereo, 2009), so that effort follows the surface and memory does
 not follow the number of photographs.")
 set(CPACK_DEBIAN_CLI_PACKAGE_NAME meshwright)
 set(CPACK_DEBIAN_CLI_PACKAGE_SECTION graphics)
-set(CPACK_DEBIAN_CLI_PACKAGE_RECOMMENDS meshwright-dashboard)
-set(CPACK_COMPONENT_CLI_DESCRIPTION "turn photographs with known cameras into a triangle mesh\n${method}")
+set(CPACK_DEBIAN_CLI_PACKAGE_RECOMMENDS "meshwright-dashboard, colmap")
+set(CPACK_COMPONENT_CLI_DESCRIPTION "turn photographs into a triangle mesh\n${method}")
 set(CPACK_DEBIAN_SERVER_PACKAGE_NAME meshwright-server)
 set(CPACK_DEBIAN_SERVER_PACKAGE_SECTION graphics)
-set(CPACK_DEBIAN_SERVER_PACKAGE_RECOMMENDS meshwright-dashboard)
+set(CPACK_DEBIAN_SERVER_PACKAGE_RECOMMENDS "meshwright-dashboard, colmap")
 set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/deploy/debian/server/conffiles
   ${PROJECT_SOURCE_DIR}/deploy/debian/server/postinst ${PROJECT_SOURCE_DIR}/deploy/debian/server/prerm
   ${PROJECT_SOURCE_DIR}/deploy/debian/server/postrm)

@@ -46,5 +46,28 @@ absl::StatusOr<StoredJobSpec> DecodeJobSpec(const std::string& text) {
   return spec;
 }
 
+std::string EncodePhotographs(const std::vector<StoredPhotograph>& photographs) {
+  Json json = {{"photographs", Json::array()}};
+  for (const StoredPhotograph& photograph : photographs) {
+    json["photographs"].push_back({photograph.path, photograph.digest});
+  }
+  return JsonText(json);
+}
+
+absl::StatusOr<std::vector<StoredPhotograph>> DecodePhotographs(const std::string& text) {
+  const absl::StatusOr<Json> json = ParseJson<Json>(text, kLimits);
+  if (!json.ok()) return absl::DataLossError(absl::StrCat("a list of photographs ", json.status().message()));
+  std::vector<StoredPhotograph> photographs;
+  try {
+    for (const Json& photograph : json->at("photographs")) {
+      photographs.push_back(
+          {.path = photograph.at(0).get<std::string>(), .digest = photograph.at(1).get<std::string>()});
+    }
+  } catch (const Json::exception& error) {
+    return absl::DataLossError(absl::StrCat("not a list of photographs: ", error.what()));
+  }
+  return photographs;
+}
+
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

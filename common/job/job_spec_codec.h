@@ -23,5 +23,17 @@ std::string EncodeJobSpec(const StoredJobSpec& spec);
 // DataLoss when it is not what EncodeJobSpec makes.
 absl::StatusOr<StoredJobSpec> DecodeJobSpec(const std::string& json);
 
+// A photograph, or a mask, whose camera is to be estimated.
+struct StoredPhotograph {
+  std::string path;    // relative, with "/"
+  std::string digest;  // in the BlobStore
+
+  bool operator==(const StoredPhotograph&) const = default;
+};
+
+// What the store keeps of the job that estimates cameras.
+std::string EncodePhotographs(const std::vector<StoredPhotograph>& photographs);
+absl::StatusOr<std::vector<StoredPhotograph>> DecodePhotographs(const std::string& json);
+
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

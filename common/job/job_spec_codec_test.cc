@@ -28,6 +28,14 @@ TEST(JobSpecCodecTest, DamageIsDataLoss) {
   }
 }
 
+TEST(JobSpecCodec, PhotographsComeBackAndNothingElseDoes) {
+  const std::vector<StoredPhotograph> photographs = {{"a 1.jpg", "aa"}, {"masks/a 1.jpg.png", "bb"}};
+  EXPECT_EQ(*DecodePhotographs(EncodePhotographs(photographs)), photographs);
+  for (const char* text : {"", "{}", R"({"photographs": [["a"]]})", R"({"photographs": [[1, 2]]})"}) {
+    EXPECT_TRUE(absl::IsDataLoss(DecodePhotographs(text).status())) << text;
+  }
+}
+
 }  // namespace
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

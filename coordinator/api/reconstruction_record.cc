@@ -8,6 +8,7 @@
 
 #include "coordinator/api/public_text.h"
 #include "coordinator/dispatch/proto_times.h"
+#include "coordinator/dispatch/public_numbers.h"
 
 namespace meshwright {
 namespace {
@@ -75,8 +76,8 @@ v1::Reconstruction ToProto(const Reconstruction& stored) {
 v1::Attempt ToProto(const std::string& reconstruction, const Attempt& stored) {
   v1::Attempt attempt;
   attempt.set_reconstruction_id(reconstruction);
-  attempt.set_sequence(stored.sequence);
-  attempt.set_camera(stored.camera);
+  attempt.set_sequence(PublicSequence(stored.sequence));
+  attempt.set_camera(PublicCamera(stored.camera));
   attempt.set_epoch(stored.epoch);
   attempt.set_worker(stored.worker);
   FillTime(stored.began_at, *attempt.mutable_begin_time());

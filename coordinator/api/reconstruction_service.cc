@@ -228,6 +228,7 @@ v1::Reconstruction ReconstructionService::Describe(const Reconstruction& stored)
                                              " of the method, this coordinator has version ", options_.method_version,
                                              ": it waits for a coordinator of the program that began it"));
   }
+  reconstruction.set_stage(workers_.StageOf(stored.id));
   for (std::string& warning : workers_.WarningsFor(stored.id)) {
     reconstruction.add_warnings(std::move(warning));
   }

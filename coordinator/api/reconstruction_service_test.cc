@@ -101,6 +101,7 @@ class ReconstructionServiceTest : public testing::Test {
          .pool = &pool_,
          .jobs_changed = [this] { workers_->Wake(); },
          .parse_config = ParseTestMethod,
+         .list_photographs = [](const std::string&) { return std::vector<PhotographFile>(); },
          .max_failures = retry.max_failures},
         *workers_);
     MW_CHECK(opened.ok());

@@ -12,9 +12,12 @@
 #include "common/base/bad_input.h"
 #include "common/base/digest.h"
 #include "common/base/files.h"
+#include "common/base/relative_path.h"
 #include "common/base/status_macros.h"
 #include "common/base/utf8.h"
 #include "common/blob/lost_blob.h"
+#include "common/job/job_spec_codec.h"
+#include "common/scene/formats/import.h"
 #include "common/scene/scene_codec.h"
 #include "common/scene/view.h"
 #include "coordinator/conductor/accepted_mesh.h"
@@ -31,6 +34,9 @@ constexpr std::chrono::seconds kRetryDelay(10);
 // Results that other coordinators took are noticed by looking again.
 constexpr std::chrono::milliseconds kPollInterval(250);
 constexpr int kMaxRepairsInARow = 100;
+
+// COLMAP is a process of its own, whose memory its worker does not know; a worker of the smallest kind takes the job.
+constexpr int64_t kEstimationBytes = int64_t{512} << 20;
 
 bool IsPermanent(const absl::Status& status) {
   return IsBadInput(status) || absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status) ||
@@ -186,10 +192,69 @@ absl::StatusOr<ReconstructionDriver::SceneFolder> ReconstructionDriver::FindScen
   return SceneFolder{.path = std::move(path), .is_temporary = true};
 }
 
-absl::StatusOr<IngestedScene> ReconstructionDriver::Take() {
+absl::Status ReconstructionDriver::RequestEstimation(const std::vector<PhotographFile>& photographs) {
+  std::vector<StoredPhotograph> stored;
+  for (const PhotographFile& photograph : photographs) {
+    MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(photograph.local_path));
+    MW_ASSIGN_OR_RETURN(const std::string digest, referenced_blobs_.Put(bytes));
+    stored.push_back({.path = photograph.path, .digest = digest});
+  }
+  const CameraAssignment job = {.sequence = kCameraEstimation,
+                                .camera = kCameraEstimation,
+                                .memory_bytes = kEstimationBytes,
+                                .spec = EncodePhotographs(stored)};
+  MW_RETURN_IF_ERROR(environment_.store->Advance(id_, {}, {job}, {}, environment_.clock->Now(), epoch_));
+  environment_.jobs_changed();
+  return absl::OkStatus();
+}
+
+absl::Status ReconstructionDriver::WaitForEstimation() {
+  while (true) {
+    const absl::StatusOr<CameraJob> job = environment_.store->GetCameraJob(id_, kCameraEstimation);
+    if (absl::IsNotFound(job.status())) return absl::OkStatus();
+    MW_RETURN_IF_ERROR(job.status());
+    if (job->state != CameraJobState::kAssigned) return absl::OkStatus();
+    changed_(false);
+    if (!WaitForNews()) return Stopped();
+  }
+}
+
+absl::StatusOr<std::optional<Scene>> ReconstructionDriver::ReadOrEstimate(const std::string& folder) {
+  std::vector<PhotographFile> photographs;
+  if (!HoldsScene(folder)) {
+    MW_ASSIGN_OR_RETURN(photographs, environment_.list_photographs(folder));
+  }
+  if (photographs.empty()) {
+    MW_ASSIGN_OR_RETURN(Scene scene, ReadScene(folder));
+    return scene;
+  }
+  const absl::StatusOr<CameraJob> job = environment_.store->GetCameraJob(id_, kCameraEstimation);
+  if (absl::IsNotFound(job.status())) {
+    MW_RETURN_IF_ERROR(RequestEstimation(photographs));
+    return std::nullopt;
+  }
+  MW_RETURN_IF_ERROR(job.status());
+  if (job->state == CameraJobState::kAssigned) return std::nullopt;
+  if (job->state == CameraJobState::kSkipped) return BadInput(absl::FailedPreconditionError(job->skip_reason));
+  MW_ASSIGN_OR_RETURN(const std::string bytes, environment_.blobs->Get(job->filtered_digest));
+  MW_ASSIGN_OR_RETURN(Scene scene, DecodeScene(bytes));
+  for (SceneView& view : scene.views) {
+    MW_RETURN_IF_ERROR(ValidateRelativePath(view.image_path));
+    view.image_path = absl::StrCat(folder, "/", view.image_path);
+  }
+  return scene;
+}
+
+absl::StatusOr<std::optional<IngestedScene>> ReconstructionDriver::Take() {
   MW_ASSIGN_OR_RETURN(const SceneFolder folder, FindSceneFolder());
-  const std::string root = folder.is_temporary ? folder.path : SceneRootOf(folder.path, folders_.scene_roots);
-  absl::StatusOr<IngestedScene> taken = IngestScene(folder.path, root, referenced_blobs_, *environment_.pool);
+  const auto take = [&]() -> absl::StatusOr<std::optional<IngestedScene>> {
+    const std::string root = folder.is_temporary ? folder.path : SceneRootOf(folder.path, folders_.scene_roots);
+    MW_RETURN_IF_ERROR(CheckConfined(folder.path, root));
+    MW_ASSIGN_OR_RETURN(std::optional<Scene> scene, ReadOrEstimate(folder.path));
+    if (!scene.has_value()) return std::nullopt;
+    return IngestScene(*std::move(scene), folder.path, root, referenced_blobs_, *environment_.pool);
+  };
+  absl::StatusOr<std::optional<IngestedScene>> taken = take();
   std::error_code error;
   if (folder.is_temporary) fs::remove_all(folder.path, error);
   return taken;
@@ -197,13 +262,17 @@ absl::StatusOr<IngestedScene> ReconstructionDriver::Take() {
 
 absl::Status ReconstructionDriver::PrepareScene(const ReconstructionConfig& config) {
   if (record_.scene_blob.empty()) {
-    MW_ASSIGN_OR_RETURN(const IngestedScene taken, Take());
-    MW_RETURN_IF_ERROR(environment_.store->SetReconstructionScene(id_, taken.scene_digest, taken.scene_blob, epoch_));
-    record_.scene_blob = taken.scene_blob;
+    std::optional<IngestedScene> taken;
+    while (!taken.has_value()) {
+      MW_RETURN_IF_ERROR(WaitForEstimation());
+      MW_ASSIGN_OR_RETURN(taken, Take());
+    }
+    MW_RETURN_IF_ERROR(environment_.store->SetReconstructionScene(id_, taken->scene_digest, taken->scene_blob, epoch_));
+    record_.scene_blob = taken->scene_blob;
   }
   absl::StatusOr<std::string> bytes = environment_.blobs->Get(record_.scene_blob);
   if (IsBlobLost(bytes.status())) {
-    MW_ASSIGN_OR_RETURN(const IngestedScene taken, Take());
+    MW_RETURN_IF_ERROR(Take().status());
     bytes = environment_.blobs->Get(record_.scene_blob);
   }
   MW_RETURN_IF_ERROR(bytes.status());
@@ -259,8 +328,8 @@ absl::StatusOr<bool> ReconstructionDriver::RepairScene(const std::string& digest
   }
   const std::string what = photograph == photographs_.end() ? "the scene's cameras and points"
                                                             : absl::StrCat("photograph ", photograph->second);
-  const absl::StatusOr<IngestedScene> taken = Take();
-  if (taken.ok() && taken->scene_blob == record_.scene_blob) return true;
+  const absl::StatusOr<std::optional<IngestedScene>> taken = Take();
+  if (taken.ok() && taken->has_value() && (*taken)->scene_blob == record_.scene_blob) return true;
   if (!taken.ok() && !IsPermanent(taken.status()) && !absl::IsNotFound(taken.status())) return taken.status();
   return absl::DataLossError(
       absl::StrCat(what, " is damaged or lost (blob ", digest, "), and cannot be read again: ",

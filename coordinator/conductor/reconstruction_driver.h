@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -25,6 +26,14 @@
 
 namespace meshwright {
 
+// A photograph of a folder without cameras, or a mask of one.
+struct PhotographFile {
+  std::string path;  // relative to the folder
+  std::string local_path;
+};
+// None: there are no photographs. Errors are bad input: too few of them, or of kinds that are not read.
+using PhotographLister = std::function<absl::StatusOr<std::vector<PhotographFile>>(const std::string& folder)>;
+
 // What all reconstructions of a coordinator share. Everything outlives them.
 struct DriverEnvironment {
   JobStore* store = nullptr;
@@ -33,6 +42,7 @@ struct DriverEnvironment {
   ThreadPool* pool = nullptr;          // acceptance and joining
   std::function<void()> jobs_changed;  // there may be new jobs in the store
   ParseReconstructionConfig parse_config;
+  PhotographLister list_photographs;
   int max_failures = 3;  // a camera whose job failed so often is skipped, >= 1
 };
 
@@ -70,7 +80,11 @@ class ReconstructionDriver {
   absl::Status Conduct();
   absl::Status DeleteEverything();
   absl::Status PrepareScene(const ReconstructionConfig& config);
-  absl::StatusOr<IngestedScene> Take();
+  // Nothing: the cameras of its photographs are being estimated.
+  absl::StatusOr<std::optional<IngestedScene>> Take();
+  absl::StatusOr<std::optional<Scene>> ReadOrEstimate(const std::string& folder);
+  absl::Status RequestEstimation(const std::vector<PhotographFile>& photographs);
+  absl::Status WaitForEstimation();
   struct SceneFolder {
     std::string path;
     bool is_temporary = false;  // made for this, and to be removed

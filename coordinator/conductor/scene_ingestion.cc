@@ -85,25 +85,34 @@ absl::Status CheckPhotographs(const Scene& scene, const fs::path& root) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<IngestedScene> IngestConfined(const std::string& folder, const std::string& root, ReferencedBlobs& blobs,
-                                             ThreadPool& pool) {
+// The same error, which calls files by their paths in the folder.
+absl::Status Inside(const std::string& folder, const absl::Status& status) {
+  absl::Status inside(status.code(), absl::StrReplaceAll(status.message(), {{folder + "/", ""}}));
+  status.ForEachPayload([&](absl::string_view name, const absl::Cord& payload) { inside.SetPayload(name, payload); });
+  return inside;
+}
+
+absl::StatusOr<fs::path> RealRoot(const std::string& root) {
   std::error_code error;
   const fs::path real_root = fs::canonical(root, error);
   if (error) return absl::UnavailableError(absl::StrCat(root, ": ", error.message()));
-  MW_RETURN_IF_ERROR(CheckLinks(folder, real_root));
-  absl::StatusOr<Scene> scene = ImportScene(folder);
-  if (!scene.ok()) return BadInput(scene.status());
-  MW_RETURN_IF_ERROR(CheckPhotographs(*scene, real_root));
+  return real_root;
+}
+
+absl::StatusOr<IngestedScene> IngestConfined(Scene scene, const std::string& root, ReferencedBlobs& blobs,
+                                             ThreadPool& pool) {
+  MW_ASSIGN_OR_RETURN(const fs::path real_root, RealRoot(root));
+  MW_RETURN_IF_ERROR(CheckPhotographs(scene, real_root));
   IngestedScene taken;
-  MW_ASSIGN_OR_RETURN(taken.scene_digest, CheckAndDigestScene(*scene, pool, [](int) {}));
-  for (SceneView& view : scene->views) {
+  MW_ASSIGN_OR_RETURN(taken.scene_digest, CheckAndDigestScene(scene, pool, [](int) {}));
+  for (SceneView& view : scene.views) {
     MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(view.image_path));
     MW_ASSIGN_OR_RETURN(view.image_path, blobs.Put(bytes));
     if (view.mask_path.empty()) continue;
     MW_ASSIGN_OR_RETURN(const std::string mask, ReadFile(view.mask_path));
     MW_ASSIGN_OR_RETURN(view.mask_path, blobs.Put(mask));
   }
-  MW_ASSIGN_OR_RETURN(taken.scene_blob, blobs.Put(EncodeScene(*scene)));
+  MW_ASSIGN_OR_RETURN(taken.scene_blob, blobs.Put(EncodeScene(scene)));
   return taken;
 }
 
@@ -139,14 +148,22 @@ std::string SceneRootOf(const std::string& folder, const std::vector<std::string
   return folder;
 }
 
-absl::StatusOr<IngestedScene> IngestScene(const std::string& folder, const std::string& root, ReferencedBlobs& blobs,
-                                          ThreadPool& pool) {
-  absl::StatusOr<IngestedScene> taken = IngestConfined(folder, root, blobs, pool);
-  if (taken.ok()) return taken;
-  absl::Status inside(taken.status().code(), absl::StrReplaceAll(taken.status().message(), {{folder + "/", ""}}));
-  taken.status().ForEachPayload(
-      [&](absl::string_view name, const absl::Cord& payload) { inside.SetPayload(name, payload); });
-  return inside;
+absl::Status CheckConfined(const std::string& folder, const std::string& root) {
+  MW_ASSIGN_OR_RETURN(const fs::path real_root, RealRoot(root));
+  return CheckLinks(folder, real_root);
+}
+
+absl::StatusOr<Scene> ReadScene(const std::string& folder) {
+  absl::StatusOr<Scene> scene = ImportScene(folder);
+  if (!scene.ok()) return Inside(folder, BadInput(scene.status()));
+  return scene;
+}
+
+absl::StatusOr<IngestedScene> IngestScene(Scene scene, const std::string& folder, const std::string& root,
+                                          ReferencedBlobs& blobs, ThreadPool& pool) {
+  absl::StatusOr<IngestedScene> taken = IngestConfined(std::move(scene), root, blobs, pool);
+  if (!taken.ok()) return Inside(folder, taken.status());
+  return taken;
 }
 
 absl::Status MaterializeScene(const std::vector<SceneFile>& files, BlobStore& blobs, const std::string& folder) {

@@ -8,6 +8,7 @@
 
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
+#include "common/scene/scene.h"
 #include "coordinator/conductor/referenced_blobs.h"
 #include "coordinator/store/job_store.h"
 
@@ -25,12 +26,18 @@ struct IngestedScene {
 // The one of `roots` that `folder`, as ResolveSceneReference gives it, is below; `folder` itself when there is none.
 std::string SceneRootOf(const std::string& folder, const std::vector<std::string>& roots);
 
-// Reads the scene in `folder`, checks every photograph and puts all of it into the BlobStore: from then on the folder
-// is not needed any more and nothing that happens to it changes the reconstruction. Nothing is read outside of `root`,
-// which has the folder in it, whatever links and names of photographs say. Errors of the scene are bad input; they call
-// its files by their paths in the folder.
-absl::StatusOr<IngestedScene> IngestScene(const std::string& folder, const std::string& root, ReferencedBlobs& blobs,
-                                          ThreadPool& pool);
+// Bad input when something in `folder` leads out of `root`, which has the folder in it. Call it before anything is
+// read.
+absl::Status CheckConfined(const std::string& folder, const std::string& root);
+
+// Reads the scene in `folder`. Its errors are bad input; they call its files by their paths in the folder.
+absl::StatusOr<Scene> ReadScene(const std::string& folder);
+
+// Checks every photograph of a scene in `folder` and puts all of it into the BlobStore: from then on the folder is not
+// needed any more and nothing that happens to it changes the reconstruction. No photograph is read outside of `root`,
+// whatever names and links say. Errors as those of ReadScene.
+absl::StatusOr<IngestedScene> IngestScene(Scene scene, const std::string& folder, const std::string& root,
+                                          ReferencedBlobs& blobs, ThreadPool& pool);
 
 // Makes `folder` anew with the files of an upload. DataLoss names a file whose blob is damaged or lost.
 absl::Status MaterializeScene(const std::vector<SceneFile>& files, BlobStore& blobs, const std::string& folder);

@@ -18,12 +18,15 @@ HeldJob HeldJobFromProto(const v1::HeldJob& held) {
       job.outcome = JobFailed{.reason = held.failed().reason(),
                               .out_of_memory = held.failed().out_of_memory(),
                               .infrastructure = held.failed().infrastructure(),
-                              .damaged_blob = held.failed().damaged_blob()};
+                              .damaged_blob = held.failed().damaged_blob(),
+                              .permanent = held.failed().permanent()};
       break;
     case v1::HeldJob::kReleased:
       job.outcome = JobReleased();
       break;
     case v1::HeldJob::kRunning:
+      job.outcome = JobRunning{.step = held.running().step(), .fraction = held.running().fraction()};
+      break;
     case v1::HeldJob::OUTCOME_NOT_SET:
       break;
   }
@@ -41,7 +44,8 @@ WorkerReport FromProto(const v1::SynchronizeRequest& request) {
                          .cores = request.cores(),
                          .memory_bytes = request.memory_bytes(),
                          .draining = request.draining(),
-                         .ran_out_of_memory = request.ran_out_of_memory()};
+                         .ran_out_of_memory = request.ran_out_of_memory(),
+                         .has_colmap = !request.colmap_version().empty()};
   for (const v1::HeldJob& held : request.held()) report.held.push_back(HeldJobFromProto(held));
   return report;
 }

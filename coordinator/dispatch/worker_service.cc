@@ -9,7 +9,9 @@
 #include <absl/strings/str_join.h>
 
 #include "common/base/status_macros.h"
+#include "common/job/job_spec_codec.h"
 #include "coordinator/dispatch/proto_times.h"
+#include "coordinator/dispatch/public_numbers.h"
 #include "coordinator/dispatch/report_from_proto.h"
 
 namespace meshwright {
@@ -93,8 +95,8 @@ std::string DescribeNoWorker(int64_t version, const std::map<int64_t, int64_t>& 
 v1::Attempt RunningAttempt(const OpenJob& job) {
   v1::Attempt attempt;
   attempt.set_reconstruction_id(job.reconstruction_id);
-  attempt.set_sequence(job.sequence);
-  attempt.set_camera(job.camera);
+  attempt.set_sequence(PublicSequence(job.sequence));
+  attempt.set_camera(PublicCamera(job.camera));
   attempt.set_epoch(job.epoch);
   attempt.set_worker(job.lease_worker);
   FillTime(job.leased_at, *attempt.mutable_begin_time());
@@ -269,6 +271,7 @@ absl::Status WorkerService::MakePass(std::list<Call>& calls) {
   SchedulingPass pass(lease_, retry_, watch_, std::move(open), now, MemoryStepsOf(store_));
   for (Call& call : calls) {
     if (!call.is_heard) call.is_settled = pass.ApplyReport(call.report);
+    NoteSteps(call.report);
   }
   pass.Expire();
   for (const Call& call : calls) {
@@ -323,10 +326,12 @@ std::vector<WorkerRecord> WorkerService::Heartbeats(const std::list<Call>& calls
                                 .instance = request.instance(),
                                 .version = request.version(),
                                 .draining = request.draining(),
-                                .method_version = request.method_version()};
+                                .method_version = request.method_version(),
+                                .colmap_version = request.colmap_version()};
     const bool is_same = before.cores == heard.cores && before.memory_bytes == heard.memory_bytes &&
                          before.instance == heard.instance && before.version == heard.version &&
-                         before.draining == heard.draining && before.method_version == heard.method_version;
+                         before.draining == heard.draining && before.method_version == heard.method_version &&
+                         before.colmap_version == heard.colmap_version;
     // One that is still to come was written before the clock was set back.
     const absl::Duration age = now - before.last_heartbeat;
     if (!is_same || age > lease_.lease / 4 || age < absl::ZeroDuration()) heartbeats.push_back(heard);
@@ -361,12 +366,26 @@ absl::StatusOr<WorkerService::Background> WorkerService::BackgroundOf(const std:
   return backgrounds_[reconstruction] = {.options_json = stored.options_json, .scene_blob = stored.scene_blob};
 }
 
+absl::StatusOr<v1::CameraJob> WorkerService::EstimationJob(const OpenJob& job, const CameraJob& stored) {
+  MW_ASSIGN_OR_RETURN(const std::vector<StoredPhotograph> photographs, DecodePhotographs(stored.spec));
+  v1::CameraJob full;
+  FillKey(job, *full.mutable_key());
+  full.set_memory_bytes(job.memory_bytes);
+  for (const StoredPhotograph& photograph : photographs) {
+    v1::Photograph& added = *full.add_photographs();
+    added.set_path(photograph.path);
+    added.set_digest(photograph.digest);
+  }
+  return full;
+}
+
 absl::StatusOr<v1::CameraJob> WorkerService::FullJob(const OpenJob& job) {
   CameraJob& stored = claimed_[{job.reconstruction_id, job.sequence}];
   if (stored.spec.empty() || stored.epoch != job.epoch) {
     // Claimed by another coordinator, or by this one before it was started anew.
     MW_ASSIGN_OR_RETURN(stored, store_.GetCameraJob(job.reconstruction_id, job.sequence));
   }
+  if (job.sequence == kCameraEstimation) return EstimationJob(job, stored);
   MW_ASSIGN_OR_RETURN(const CameraJobSpec spec, SpecOf(stored));
   MW_ASSIGN_OR_RETURN(const Background background, BackgroundOf(job.reconstruction_id));
   v1::CameraJob full;
@@ -414,9 +433,46 @@ void WorkerService::Publish(const SchedulingPass& pass, absl::Time now) {
     it = leased.count(it->first) > 0 ? std::next(it) : claimed_.erase(it);
   }
   const MutexLock lock(mutex_);
+  for (auto it = steps_.begin(); it != steps_.end();) {
+    it = leased.count({it->first, kCameraEstimation}) > 0 ? std::next(it) : steps_.erase(it);
+  }
   seen_ = pass.jobs();
   workers_ = written_workers_;
   seen_at_ = now;
+}
+
+void WorkerService::NoteSteps(const WorkerReport& report) {
+  const MutexLock lock(mutex_);
+  for (const HeldJob& held : report.held) {
+    const auto* const running = std::get_if<JobRunning>(&held.outcome);
+    if (running != nullptr && !running->step.empty()) steps_[held.key.reconstruction] = *running;
+  }
+}
+
+std::string WorkerService::StageOf(const std::string& reconstruction) const {
+  const MutexLock lock(mutex_);
+  for (const OpenJob& job : seen_) {
+    if (job.reconstruction_id != reconstruction || job.sequence != kCameraEstimation) continue;
+    if (job.lease_worker.empty()) {
+      return HasWorkerWithColmap(job.method_version) ? "cameras: waiting for a worker"
+                                                     : "cameras: waiting for a worker with COLMAP";
+    }
+    const auto step = steps_.find(reconstruction);
+    if (step == steps_.end()) return absl::StrCat("cameras: worker ", job.lease_worker, " begins");
+    return absl::StrFormat("cameras: %s, %.0f %%", step->second.step, 100 * step->second.fraction);
+  }
+  return "";
+}
+
+bool WorkerService::IsAlive(const WorkerRecord& worker) const {
+  return absl::AbsDuration(seen_at_ - worker.last_heartbeat) <= lease_.lease && !worker.draining && !worker.drained;
+}
+
+bool WorkerService::HasWorkerWithColmap(int64_t method_version) const {
+  return std::any_of(workers_.begin(), workers_.end(), [&](const auto& entry) {
+    const WorkerRecord& worker = entry.second;
+    return IsAlive(worker) && worker.method_version == method_version && !worker.colmap_version.empty();
+  });
 }
 
 int WorkerService::LeasesIn(const std::string& reconstruction) const {
@@ -430,9 +486,7 @@ std::vector<std::string> WorkerService::WarningsFor(const std::string& reconstru
   const MutexLock lock(mutex_);
   std::map<int64_t, int64_t> largest;  // method version -> memory of the largest worker that takes jobs
   for (const auto& [id, worker] : workers_) {
-    const bool is_heard = absl::AbsDuration(seen_at_ - worker.last_heartbeat) <= lease_.lease;
-    const bool is_alive = is_heard && !worker.draining && !worker.drained;
-    if (is_alive) largest[worker.method_version] = std::max(largest[worker.method_version], worker.memory_bytes);
+    if (IsAlive(worker)) largest[worker.method_version] = std::max(largest[worker.method_version], worker.memory_bytes);
   }
   std::vector<std::string> warnings;
   std::set<int64_t> without_worker;
@@ -441,6 +495,12 @@ std::vector<std::string> WorkerService::WarningsFor(const std::string& reconstru
     const auto fitting = largest.find(job.method_version);
     if (fitting == largest.end()) {
       without_worker.insert(job.method_version);
+    } else if (job.sequence == kCameraEstimation) {
+      if (!HasWorkerWithColmap(job.method_version)) {
+        warnings.emplace_back(
+            "no worker can estimate the photographs' cameras: start one where COLMAP is installed (apt-get install "
+            "colmap), or submit the photographs with their cameras");
+      }
     } else if (job.memory_bytes > fitting->second) {
       warnings.push_back(absl::StrFormat(
           "camera %d needs %.1f GiB of memory, the largest worker has %.1f GiB: start a worker with more", job.camera,
@@ -477,6 +537,7 @@ v1::ListWorkersResponse WorkerService::ListWorkers() const {
     worker.set_draining(record.draining || record.drained);
     worker.set_version(record.version);
     worker.set_method_version(static_cast<int32_t>(record.method_version));
+    worker.set_colmap_version(record.colmap_version);
     FillTime(record.last_heartbeat, *worker.mutable_last_seen());
     by_id[record.id] = &worker;
   }

@@ -58,6 +58,8 @@ class WorkerService {
 
   int LeasesIn(const std::string& reconstruction) const;
   // What blocks its jobs: none of the workers is large enough, or there is none.
+  // What is done before its cameras are there, in words; "": nothing of the kind.
+  std::string StageOf(const std::string& reconstruction) const;
   std::vector<std::string> WarningsFor(const std::string& reconstruction) const;
   // Those of all coordinators, as of the last passes.
   v1::ListWorkersResponse ListWorkers() const;
@@ -89,6 +91,10 @@ class WorkerService {
   std::vector<WorkerRecord> Heartbeats(const std::list<Call>& calls, absl::Time now);
   absl::Status LookAtWorkers(absl::Time now);
   absl::StatusOr<v1::CameraJob> FullJob(const OpenJob& job);
+  static absl::StatusOr<v1::CameraJob> EstimationJob(const OpenJob& job, const CameraJob& stored);
+  void NoteSteps(const WorkerReport& report);
+  bool IsAlive(const WorkerRecord& worker) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool HasWorkerWithColmap(int64_t method_version) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<Background> BackgroundOf(const std::string& reconstruction);
   absl::StatusOr<v1::SynchronizeResponse> AnswerTo(const Call& call, const std::vector<const OpenJob*>& held);
   void Publish(const SchedulingPass& pass, absl::Time now);
@@ -117,6 +123,7 @@ class WorkerService {
   int64_t next_call_ ABSL_GUARDED_BY(mutex_) = 1;
   std::vector<OpenJob> seen_ ABSL_GUARDED_BY(mutex_);  // as of the last pass
   std::map<std::string, WorkerRecord> workers_ ABSL_GUARDED_BY(mutex_);
+  std::map<std::string, JobRunning> steps_ ABSL_GUARDED_BY(mutex_);  // of estimating cameras, by reconstruction
   absl::Time seen_at_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   std::thread thread_;
 };

@@ -27,6 +27,7 @@
 #include "coordinator/dispatch/worker_service.h"
 #include "coordinator/grpc/grpc_server.h"
 #include "coordinator/main/check_settings.h"
+#include "coordinator/main/list_photographs.h"
 #include "coordinator/main/open_gate.h"
 #include "coordinator/main/open_job_store.h"
 #include "coordinator/main/open_nodeodm.h"
@@ -115,6 +116,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
                                            .pool = &pool_,
                                            .jobs_changed = [this] { workers_->Wake(); },
                                            .parse_config = ParseConfig,
+                                           .list_photographs = ListPhotographFiles,
                                            .max_failures = retry_.max_failures};
     MW_ASSIGN_OR_RETURN(reconstructions_, ReconstructionService::Open(
                                               {.data_folder = data,

@@ -147,7 +147,9 @@ absl::StatusOr<Json> LogJson(const ReconstructionService& service, const std::st
     if (!attempt.has_end_time()) continue;
     last_end.try_emplace(attempt.camera(), TimeOf(attempt.end_time()));
     const bool is_known = attempt.camera() >= 0 && attempt.camera() < cameras.cameras_size();
-    auto entry = EntryOf(attempt, is_known ? cameras.cameras(attempt.camera()).name() : "a camera");
+    auto entry = EntryOf(attempt, is_known                 ? cameras.cameras(attempt.camera()).name()
+                                  : attempt.camera() == -1 ? "estimating the cameras"
+                                                           : "a camera");
     if (entry) entries.push_back(*std::move(entry));
   }
   // Attempts come with the last ones first, and of the same moment the last one is to be told last.

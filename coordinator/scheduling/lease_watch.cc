@@ -27,9 +27,9 @@ bool LeaseWatch::HasRunOut(const OpenJob& job) const {
   return seen != leases_.end() && now_ - seen->second.unchanged_since >= lease_.lease;
 }
 
-bool LeaseWatch::TakesTooLong(const OpenJob& job) const {
+bool LeaseWatch::TakesTooLong(const OpenJob& job, absl::Duration limit) const {
   const auto seen = leases_.find(KeyOf(job));
-  return seen != leases_.end() && now_ - seen->second.first > lease_.job_time_limit;
+  return seen != leases_.end() && now_ - seen->second.first > limit;
 }
 
 }  // namespace meshwright

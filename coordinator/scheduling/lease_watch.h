@@ -22,7 +22,7 @@ class LeaseWatch {
   void Observe(const std::vector<OpenJob>& open, absl::Duration uptime);
   // Its worker has not renewed it for the length of a lease.
   bool HasRunOut(const OpenJob& job) const;
-  bool TakesTooLong(const OpenJob& job) const;
+  bool TakesTooLong(const OpenJob& job, absl::Duration limit) const;
 
  private:
   struct Seen {

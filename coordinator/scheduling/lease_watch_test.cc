@@ -52,16 +52,16 @@ TEST(LeaseWatchTest, AJobTakesTooLongHoweverOftenItsLeaseIsRenewed) {
     const OpenJob job = Leased(absl::UnixEpoch() + now + absl::Seconds(30));
     watch.Observe({job}, now);
     EXPECT_FALSE(watch.HasRunOut(job));
-    EXPECT_FALSE(watch.TakesTooLong(job)) << seconds;
+    EXPECT_FALSE(watch.TakesTooLong(job, kLease.job_time_limit)) << seconds;
     now += absl::Seconds(10);
   }
   OpenJob job = Leased(absl::UnixEpoch() + now);
   watch.Observe({job}, now);
-  EXPECT_TRUE(watch.TakesTooLong(job));
+  EXPECT_TRUE(watch.TakesTooLong(job, kLease.job_time_limit));
   // Handed out again it begins anew.
   ++job.epoch;
   watch.Observe({job}, now);
-  EXPECT_FALSE(watch.TakesTooLong(job));
+  EXPECT_FALSE(watch.TakesTooLong(job, kLease.job_time_limit));
 }
 
 }  // namespace

@@ -12,6 +12,7 @@ namespace {
 
 // Renewing costs a write: done when a third of the lease is gone.
 constexpr double kRenewBelow = 2.0 / 3.0;
+constexpr int kLimitsOfEstimation = 12;
 
 absl::Duration DelayAfter(const RetryOptions& retry, int64_t attempt) {
   const int64_t doublings = std::min<int64_t>(attempt - 1, 20);
@@ -165,6 +166,12 @@ void SchedulingPass::ApplyFailed(size_t index, const JobFailed& failed) {
   const OpenJob& job = jobs_[index];
   const bool is_damage = ValidateDigest(failed.damaged_blob).ok();
   if (is_damage) damaged_blobs_.emplace_back(job.reconstruction_id, failed.damaged_blob);
+  if (failed.permanent && job.sequence == kCameraEstimation) {
+    JobChange change = ChangeOf(JobChange::Kind::kSkipped, job);
+    change.reason = failed.reason;
+    Add(index, std::move(change));
+    return;
+  }
   Add(index, failed.infrastructure || is_damage ? LossOf(job, failed.reason, false)
                                                 : FailureOf(job, failed.reason, failed.out_of_memory));
 }
@@ -174,7 +181,7 @@ void SchedulingPass::ApplyRunning(size_t index) {
   // One that seems to last longer than any was written before the clock was set back.
   const absl::Duration left = job.lease_expires_at - now_;
   if (left > kRenewBelow * lease_.lease && left <= lease_.lease) return;
-  if (watch_.TakesTooLong(job)) return;  // Expire() sees to it
+  if (watch_.TakesTooLong(job, TimeLimit(job))) return;  // Expire() sees to it
   JobChange change = ChangeOf(JobChange::Kind::kRenew, job);
   change.expires_at = now_ + lease_.lease;
   Add(index, std::move(change));
@@ -184,8 +191,8 @@ void SchedulingPass::Expire() {
   for (size_t i = 0; i < jobs_.size(); ++i) {
     const OpenJob& job = jobs_[i];
     if (job.lease_worker.empty() || changed_[i]) continue;
-    if (watch_.TakesTooLong(job)) {
-      Add(i, FailureOf(job, absl::StrCat("took longer than ", absl::FormatDuration(lease_.job_time_limit)), false));
+    if (watch_.TakesTooLong(job, TimeLimit(job))) {
+      Add(i, FailureOf(job, absl::StrCat("took longer than ", absl::FormatDuration(TimeLimit(job))), false));
     } else if (watch_.HasRunOut(job)) {
       JobChange change = LossOf(job, absl::StrCat("worker ", job.lease_worker, " is silent"), false);
       change.only_if_expired_at = job.lease_expires_at;  // not if it has been renewed since
@@ -194,7 +201,12 @@ void SchedulingPass::Expire() {
   }
 }
 
+absl::Duration SchedulingPass::TimeLimit(const OpenJob& job) const {
+  return job.sequence == kCameraEstimation ? kLimitsOfEstimation * lease_.job_time_limit : lease_.job_time_limit;
+}
+
 bool SchedulingPass::Fits(const OpenJob& job, const WorkerReport& report, int64_t free_bytes) const {
+  if (job.sequence == kCameraEstimation && !report.has_colmap) return false;
   // A pause that seems longer than any was begun before the clock was set back.
   const bool is_ready = job.not_before <= now_ || job.not_before - now_ > retry_.max_backoff;
   return is_ready && job.method_version == report.method_version && job.memory_bytes <= free_bytes;

@@ -72,6 +72,7 @@ class SchedulingPass {
   void ApplyRunning(size_t job);
   void Add(size_t job, JobChange change);
   bool Fits(const OpenJob& job, const WorkerReport& report, int64_t free_bytes) const;
+  absl::Duration TimeLimit(const OpenJob& job) const;
 
   const LeaseOptions& lease_;
   const RetryOptions& retry_;

@@ -107,6 +107,44 @@ TEST(SchedulingPassTest, WhatItHoldsAlreadyCounts) {
   EXPECT_THAT(Changes(full), IsEmpty());
 }
 
+TEST(SchedulingPassTest, CamerasAreEstimatedByWorkersThatCan) {
+  const OpenJob job = Waiting("a", kCameraEstimation);
+  SchedulingPass plan = Plan({job, Waiting("b", 1)});
+  plan.Grant(Worker("w", 2));
+  EXPECT_THAT(Changes(plan), ElementsAre("claim b1"));
+  WorkerReport able = Worker("v", 2);
+  able.has_colmap = true;
+  plan.Grant(able);
+  EXPECT_THAT(Changes(plan), ElementsAre("claim b1", absl::StrCat("claim a", kCameraEstimation)));
+}
+
+TEST(SchedulingPassTest, EstimatingCamerasMayTakeTwelveTimesAsLong) {
+  const auto changes = [](absl::Duration age) {
+    OpenJob job = Leased("a", kCameraEstimation, "w");
+    LeaseWatch watch(kLease);
+    for (absl::Duration uptime = absl::ZeroDuration(); uptime <= age; uptime += absl::Seconds(1)) {
+      job.lease_expires_at += absl::Seconds(1);  // its worker is alive
+      watch.Observe({job}, uptime);
+    }
+    SchedulingPass plan = Plan({job}, kNow, watch);
+    plan.Expire();
+    return Changes(plan);
+  };
+  EXPECT_THAT(changes(12 * kLease.job_time_limit - absl::Seconds(1)), IsEmpty());
+  EXPECT_THAT(changes(12 * kLease.job_time_limit + absl::Seconds(1)),
+              ElementsAre(absl::StrCat("fail a", kCameraEstimation)));
+}
+
+TEST(SchedulingPassTest, PhotographsThatGiveNoCamerasAreNotTriedAgain) {
+  const OpenJob job = Leased("a", kCameraEstimation, "w");
+  WorkerReport report = Worker("w");
+  Hold(report, job).outcome = JobFailed{.reason = "no overlap", .permanent = true};
+  SchedulingPass plan = Plan({job});
+  plan.ApplyReport(report);
+  EXPECT_THAT(Changes(plan), ElementsAre(absl::StrCat("skip a", kCameraEstimation)));
+  EXPECT_EQ(plan.changes()[0].change.reason, "no overlap");
+}
+
 TEST(SchedulingPassTest, ADrainingWorkerGetsNothing) {
   SchedulingPass plan = Plan({Waiting("a", 1)});
   WorkerReport report = Worker("w");

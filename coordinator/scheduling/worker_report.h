@@ -21,7 +21,11 @@ struct JobKey {
 inline JobKey KeyOf(const OpenJob& job) { return {job.reconstruction_id, job.sequence, job.epoch}; }
 
 // What has become of a job that a worker holds.
-struct JobRunning {};
+struct JobRunning {
+  // Of estimating cameras: what it is at, and how much of everything is done.
+  std::string step;
+  double fraction = 0;
+};
 struct JobFinished {
   std::string filtered_digest;  // F_r, durable in the BlobStore
   std::vector<CameraIndex> weak_targets;
@@ -32,6 +36,7 @@ struct JobFailed {
   bool out_of_memory = false;
   bool infrastructure = false;  // says nothing about the job
   std::string damaged_blob;     // "" unless it could not read this one
+  bool permanent = false;       // another attempt would meet the same
 };
 struct JobReleased {};
 
@@ -49,6 +54,7 @@ struct WorkerReport {
   int64_t memory_bytes = 0;
   bool draining = false;           // it wants nothing more
   bool ran_out_of_memory = false;  // the process before it did
+  bool has_colmap = false;         // it can estimate cameras
   std::vector<HeldJob> held;
 };
 

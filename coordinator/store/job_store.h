@@ -59,6 +59,11 @@ struct Reconstruction {
 // Jobs get done in any order; they are committed in the order of their sequence numbers.
 enum class CameraJobState { kAssigned, kDone, kSkipped };
 
+// The sequence, and the camera, of the job that estimates the cameras of photographs: once for a reconstruction that
+// begins without them, with leases, failures and attempts as all jobs have them. It runs while the reconstruction is
+// being prepared; its result is a blob with the scene. ListCameraJobs and ListResults leave it out.
+constexpr SequenceNumber kCameraEstimation = std::numeric_limits<SequenceNumber>::max();
+
 struct CameraJob {
   SequenceNumber sequence = 0;
   CameraIndex camera = 0;
@@ -201,6 +206,7 @@ struct WorkerRecord {
   std::string version;
   bool draining = false;       // it says so itself
   int64_t method_version = 0;  // 0: it does not say
+  std::string colmap_version;  // "": it cannot estimate cameras
 };
 
 struct SceneFile {

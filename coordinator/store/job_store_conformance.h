@@ -390,6 +390,25 @@ TEST_P(JobStoreConformance, OpenJobsAreThoseOfReconstructionsThatRun) {
   ASSERT_EQ(store().ListOpenJobs()->size(), 1);
 }
 
+TEST_P(JobStoreConformance, CamerasAreEstimatedBeforeItRunsByAJobThatIsNoCameras) {
+  Reconstruction prepared = kReconstruction;
+  prepared.id = "photographs";
+  prepared.state = ReconstructionState::kPreparing;
+  ASSERT_TRUE(store().CreateReconstruction(prepared, kNow).ok());
+  ASSERT_TRUE(Assign("photographs", {.sequence = kCameraEstimation, .camera = kCameraEstimation, .spec = "[]"}).ok());
+  const auto open = store().ListOpenJobs();
+  ASSERT_TRUE(open.ok()) << open.status();
+  ASSERT_EQ(open->size(), 1);
+  EXPECT_EQ(open->front().sequence, kCameraEstimation);
+  ASSERT_TRUE(Complete("photographs", kCameraEstimation, 1, Digest('e')).ok());
+  EXPECT_TRUE(store().ListCameraJobs("photographs")->empty());
+  EXPECT_TRUE(store().ListResults("photographs")->empty());
+  const auto job = store().GetCameraJob("photographs", kCameraEstimation);
+  ASSERT_TRUE(job.ok()) << job.status();
+  EXPECT_EQ(job->state, CameraJobState::kDone);
+  EXPECT_EQ(job->filtered_digest, Digest('e'));
+}
+
 TEST_P(JobStoreConformance, OnlyTheHolderRenews) {
   AssignJobs("castle", 1);
   ASSERT_TRUE(Claim(1, 1, "ant").status.ok());
@@ -797,7 +816,8 @@ TEST_P(JobStoreConformance, WorkersAreKnownByTheirHeartbeats) {
          .instance = "x",
          .version = "7",
          .draining = true,
-         .method_version = 3};
+         .method_version = 3,
+         .colmap_version = "3.8"};
   ASSERT_TRUE(store().ApplyChanges({}, {ant}, kNow).ok());
   Reopen();
   const auto workers = store().ListWorkers();
@@ -811,6 +831,7 @@ TEST_P(JobStoreConformance, WorkersAreKnownByTheirHeartbeats) {
   EXPECT_EQ(workers->at(0).version, "7");
   EXPECT_EQ(workers->at(0).method_version, 3);
   EXPECT_EQ(workers->at(1).method_version, 0);
+  EXPECT_EQ(workers->at(0).colmap_version, "3.8");
   EXPECT_TRUE(workers->at(0).drained);
   EXPECT_TRUE(workers->at(0).draining);
   EXPECT_EQ(workers->at(1).memory_bytes, 8'000'000'000);

@@ -97,7 +97,8 @@ SqlCall HeartbeatCall(const WorkerRecord& worker) {
            {"instance", worker.instance},
            {"version", worker.version},
            {"draining", worker.draining ? 1 : 0},
-           {"method_version", worker.method_version}}};
+           {"method_version", worker.method_version},
+           {"colmap_version", worker.colmap_version}}};
 }
 
 }  // namespace
@@ -255,7 +256,8 @@ absl::StatusOr<std::vector<WorkerRecord>> SqlJobStore::ListWorkers() {
                        .instance = row.Text(5),
                        .version = row.Text(6),
                        .draining = row.Integer(7) != 0,
-                       .method_version = row.Integer(8)});
+                       .method_version = row.Integer(8),
+                       .colmap_version = row.Text(9)});
   }
   return workers;
 }

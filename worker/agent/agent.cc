@@ -10,6 +10,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include "common/base/bad_input.h"
 #include "common/base/clock.h"
 #include "common/base/status_macros.h"
 #include "common/base/utf8.h"
@@ -103,6 +104,7 @@ v1::SynchronizeRequest Agent::NextRequest() {
   request.set_method_version(static_cast<int32_t>(options_.method_version));
   request.set_memory_bytes(options_.memory_bytes);
   request.set_ran_out_of_memory(options_.ran_out_of_memory);
+  request.set_colmap_version(options_.estimator.colmap_version);
   const MutexLock lock(mutex_);
   int lost_cores = 0;
   for (auto& [key, held] : held_) {
@@ -161,7 +163,7 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
   const Logger log = log_.With(FieldsOf(job.key())).With({{"camera", static_cast<int64_t>(job.camera())}});
   log.Info("job begun");
   const Stopwatch stopwatch(clock_);
-  v1::HeldJob told = Process(job);
+  v1::HeldJob told = job.photographs().empty() ? Process(job) : ProcessPhotographs(key, job);
   const double seconds = stopwatch.Seconds();
   if (told.has_failed()) {
     log.Error("job failed", {{"seconds", seconds}, {"error", told.failed().reason()}});
@@ -178,6 +180,41 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
   }
   wake_.NotifyAll();
   channel_.Interrupt();
+}
+
+v1::HeldJob Agent::ProcessPhotographs(const Key& key, const v1::CameraJob& job) {
+  const auto stop = [&] {
+    const MutexLock lock(mutex_);
+    return held_.at(key).dropped || clock_.Uptime() >= drain_until_;
+  };
+  const auto progress = [&](const std::string& step, double fraction) {
+    const MutexLock lock(mutex_);
+    v1::HeldJob& told = held_.at(key).told;
+    if (!told.has_running()) return;
+    told.mutable_running()->set_step(step);
+    told.mutable_running()->set_fraction(fraction);
+  };
+  v1::HeldJob told;
+  *told.mutable_key() = job.key();
+  const absl::StatusOr<FinishedJob> finished =
+      options_.estimator.estimate == nullptr
+          ? absl::FailedPreconditionError("this worker has no COLMAP")
+          : EstimateCamerasOf(job, options_.estimator, blobs_, options_.work_folder, options_.cores, stop, progress);
+  if (finished.ok()) {
+    told.mutable_finished()->set_filtered_digest(finished->filtered_digest);
+    told.mutable_finished()->set_report_json(finished->report_json);
+  } else if (absl::IsCancelled(finished.status())) {
+    told.mutable_released();
+  } else {
+    const absl::Status& status = finished.status();
+    v1::HeldJob::Failed& failed = *told.mutable_failed();
+    failed.set_reason(std::string(status.message()));
+    failed.set_permanent(IsBadInput(status) || absl::IsFailedPrecondition(status));
+    // COLMAP that breaks down counts against the photographs, a folder or a blob that is not to be had does not.
+    failed.set_infrastructure(!failed.permanent() && !absl::IsInternal(status));
+    failed.set_damaged_blob(LostBlobOf(status));
+  }
+  return told;
 }
 
 v1::HeldJob Agent::Process(const v1::CameraJob& job) {

@@ -20,6 +20,7 @@
 #include "common/blob/blob_store.h"
 #include "common/blob/lost_blob.h"
 #include "common/telemetry/log.h"
+#include "worker/agent/camera_estimation.h"
 #include "worker/agent/job_contexts.h"
 #include "worker/agent/worker_channel.h"
 
@@ -34,6 +35,8 @@ struct AgentOptions {
   absl::Duration drain = absl::Seconds(30);  // after Drain(), jobs may take so long before they are released
   // The process of this worker before this one was killed since memory ran out.
   bool ran_out_of_memory = false;
+  std::string work_folder;    // for estimating cameras
+  CameraEstimator estimator;  // of a worker that can
 };
 
 // What RunCameraJob is, or something quick in tests.
@@ -66,6 +69,7 @@ class Agent {
 
   void Work(const Key& key, const v1::CameraJob& job);
   v1::HeldJob Process(const v1::CameraJob& job);
+  v1::HeldJob ProcessPhotographs(const Key& key, const v1::CameraJob& job);
   v1::SynchronizeRequest NextRequest();
   void Follow(const v1::SynchronizeResponse& response);
   bool Finished();

@@ -1,6 +1,8 @@
 #include "worker/main/worker_program.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include <absl/strings/ascii.h>
@@ -20,6 +22,7 @@
 #include "common/telemetry/metrics_server.h"
 #include "worker/agent/agent.h"
 #include "worker/agent/grpc_coordinator.h"
+#include "worker/main/colmap_estimator.h"
 #include "worker/main/parse_job_config.h"
 #include "worker/telemetry/measured_worker_channel.h"
 
@@ -42,6 +45,24 @@ absl::StatusOr<CoordinatorCredentials> ReadCredentials(const WorkerSettings& set
   return credentials;
 }
 
+// The same for all workers of a user on this machine: what one began another one goes on with.
+std::string WorkFolder() {
+  std::error_code error;
+  const std::filesystem::path temporary = std::filesystem::temp_directory_path(error);
+  return absl::StrCat(error ? "/tmp" : temporary.string(), "/meshwright-worker-", ::getuid());
+}
+
+CameraEstimator FindEstimator(const Logger& log) {
+  std::string why_not;
+  CameraEstimator estimator = MakeColmapEstimator(&why_not);
+  if (why_not.empty()) {
+    log.Info("estimates cameras", {{"colmap", estimator.colmap_version}});
+  } else {
+    log.Info("does not estimate cameras", {{"reason", why_not}});
+  }
+  return estimator;
+}
+
 class RealWorkerProgram final : public WorkerProgram {
  public:
   RealWorkerProgram(const WorkerSettings& settings, std::unique_ptr<GrpcCoordinator> coordinator,
@@ -59,7 +80,9 @@ class RealWorkerProgram final : public WorkerProgram {
              .cores = settings.cores,
              .memory_bytes = MemoryMib(settings) << 20,
              .drain = absl::Seconds(settings.drain_seconds),
-             .ran_out_of_memory = settings.ran_out_of_memory},
+             .ran_out_of_memory = settings.ran_out_of_memory,
+             .work_folder = WorkFolder(),
+             .estimator = FindEstimator(log_)},
             channel_, blobs_, ParseJobConfig,
             [](const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
               return RunCameraJob(input, options, pool);

@@ -24,7 +24,8 @@ let lastCameras: Camera[] = [];
 async function attemptsAt(url: string, most: number, signal: AbortSignal): Promise<Attempt[]> {
   const response = await get(`${url}/attempts?maxAttempts=${most}`, signal);
   const json = (await response.json()) as { attempts?: Attempt[] };
-  return (json.attempts ?? []).reverse();
+  // The job that estimates cameras is of none of them.
+  return (json.attempts ?? []).filter(({ camera }) => camera >= 0).reverse();
 }
 
 async function answer(request: DataRequest, signal: AbortSignal): Promise<[unknown, Transferable[]]> {

@@ -28,6 +28,7 @@ export interface Reconstruction {
   progress?: Progress;
   meshBytes?: string;
   meshSha256?: string;
+  stage?: string; // what is being done while PREPARING, in words
 }
 
 // Positions are the numbers in CameraTable.states.

@@ -147,6 +147,7 @@ export default function ReconstructionPage({ id }: { id: string }) {
       </div>
       {store?.missing.value && <Notice tone="danger">There is no reconstruction “{id}” here.</Notice>}
       {failure !== '' && <Notice tone="danger">{failure}</Notice>}
+      {(reconstruction?.stage ?? '') !== '' && <Notice>{reconstruction!.stage}</Notice>}
       {state === 'FAILED' && <Notice tone="danger">It failed: {reconstruction!.failure}</Notice>}
       {store !== null && !store.missing.value && (
         <div class="reconstruction">

@@ -59,9 +59,9 @@ function DropZone({ onFiles }: { onFiles: (files: FileToSend[], name: string) =>
       onDrop={(event) => void drop(event)}
     >
       <p>
-        <strong>Drop a scene’s folder here</strong>, or photographs together with their cameras
+        <strong>Drop photographs here</strong>, or a scene’s folder: photographs together with their cameras
       </p>
-      <p class="muted small">COLMAP (text or binary), Middlebury or Strecha; JPEG, PNG, PGM or PPM</p>
+      <p class="muted small">JPEG, PNG, PGM or PPM; cameras of COLMAP (text or binary), Middlebury or Strecha</p>
       <div class="drop-buttons">
         <button type="button" class="button" onClick={() => folder.current?.click()}>
           Choose a folder
@@ -190,9 +190,11 @@ function SceneField({ files, onFiles, reference, onReference, busy }: SceneField
         {files.length > 0 && (
           <div class="found" role="status">
             {summary.format === null ? (
-              <Notice tone="warning">
-                {count(summary.photographs)} photographs, but no cameras of COLMAP, Middlebury or Strecha among the
-                files.
+              <Notice tone={summary.photographs < 3 ? 'warning' : ''}>
+                <strong>{count(summary.photographs)} photographs without cameras</strong>, {bytes(summary.bytes)}:{' '}
+                {summary.photographs < 3
+                  ? 'at least 3 are needed.'
+                  : 'a worker with COLMAP estimates their cameras first.'}
               </Notice>
             ) : (
               <Notice>

@@ -123,18 +123,20 @@ FROM camera_jobs WHERE reconstruction_id = :id AND sequence = :sequence;
 SELECT reconstruction_id, sequence, camera, snapshot, state, epoch, filtered_digest, weak_targets, report_json,
        set_aside_reason, memory_bytes, failed_attempts, out_of_memory_failures, last_failure, not_before,
        lease_worker, lease_expires_at, losses, reduction, expected_digest, neighbours, lease_instance, leased_at
-FROM camera_jobs WHERE reconstruction_id = :id AND sequence > :after ORDER BY sequence;
+FROM camera_jobs WHERE reconstruction_id = :id AND sequence > :after AND sequence < 2147483647 ORDER BY sequence;
 
 -- name: list_outcomes
 SELECT sequence, state, epoch, filtered_digest, weak_targets
-FROM camera_jobs WHERE reconstruction_id = :id AND sequence > :after AND state <> 'assigned' ORDER BY sequence;
+FROM camera_jobs
+WHERE reconstruction_id = :id AND sequence > :after AND sequence < 2147483647 AND state <> 'assigned' ORDER BY sequence;
 
 -- name: list_open_jobs
 SELECT j.reconstruction_id, j.sequence, j.camera, j.epoch, j.memory_bytes, j.failed_attempts, j.losses, j.reduction,
        j.not_before, j.lease_worker, j.lease_instance, j.leased_at, j.lease_expires_at, r.weight_thousandths,
        CASE WHEN j.expected_digest IS NULL THEN 0 ELSE 1 END, r.method_version
 FROM camera_jobs AS j JOIN reconstructions AS r ON r.id = j.reconstruction_id
-WHERE j.state = 'assigned' AND r.state IN ('running', 'joining')
+WHERE j.state = 'assigned'
+  AND (r.state IN ('running', 'joining') OR (r.state = 'preparing' AND j.sequence = 2147483647))
 ORDER BY j.reconstruction_id, j.sequence;
 
 -- name: claim_camera_job
@@ -226,19 +228,22 @@ WHERE r.state IN ('preparing', 'running', 'joining', 'deleting')
 ORDER BY r.id;
 
 -- name: record_heartbeat
-INSERT INTO workers (id, cores, memory_bytes, last_heartbeat, instance, version, draining, method_version)
-VALUES (:worker, :cores, :memory_bytes, :now, :instance, :version, :draining, :method_version)
+INSERT INTO workers (id, cores, memory_bytes, last_heartbeat, instance, version, draining, method_version,
+                     colmap_version)
+VALUES (:worker, :cores, :memory_bytes, :now, :instance, :version, :draining, :method_version,
+        :colmap_version)
 ON CONFLICT (id) DO UPDATE
 SET cores = excluded.cores, memory_bytes = excluded.memory_bytes, last_heartbeat = excluded.last_heartbeat,
     drained = CASE WHEN workers.instance = excluded.instance THEN workers.drained ELSE 0 END,
     instance = excluded.instance, version = excluded.version, draining = excluded.draining,
-    method_version = excluded.method_version;
+    method_version = excluded.method_version, colmap_version = excluded.colmap_version;
 
 -- name: set_worker_drained
 UPDATE workers SET drained = :drained WHERE id = :worker;
 
 -- name: list_workers
-SELECT id, cores, memory_bytes, last_heartbeat, drained, instance, version, draining, method_version
+SELECT id, cores, memory_bytes, last_heartbeat, drained, instance, version, draining, method_version,
+       colmap_version
 FROM workers ORDER BY id;
 
 -- name: remove_silent_workers
@@ -293,7 +298,8 @@ DELETE FROM damaged_blobs WHERE reconstruction_id = :id AND digest = :digest;
 
 -- name: count_assigned_camera_jobs
 SELECT count(*) FROM camera_jobs AS j JOIN reconstructions AS r ON r.id = j.reconstruction_id
-WHERE j.state = 'assigned' AND r.state IN ('running', 'joining');
+WHERE j.state = 'assigned'
+  AND (r.state IN ('running', 'joining') OR (r.state = 'preparing' AND j.sequence = 2147483647));
 
 -- name: count_reconstructions
 SELECT state, count(*) FROM reconstructions GROUP BY state;

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "coordinator/store/job_store.h"
+
+namespace meshwright {
+
+// How the job that estimates cameras is called outside: sequence 0, before all others, of camera -1, which is none.
+inline SequenceNumber PublicSequence(SequenceNumber sequence) { return sequence == kCameraEstimation ? 0 : sequence; }
+inline CameraIndex PublicCamera(CameraIndex camera) { return camera == kCameraEstimation ? -1 : camera; }
+
+}  // namespace meshwright
+// SPDX-License-Identifier: Apache-2.0
