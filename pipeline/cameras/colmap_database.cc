@@ -9,6 +9,7 @@
 #include <sqlite3.h>
 
 #include "pipeline/cameras/nearest_descriptors.h"
+#include "pipeline/cameras/sqlite_library.h"
 
 #include "common/base/status_macros.h"
 
@@ -25,29 +26,29 @@ constexpr int kLockTimeoutMs = 10'000;
 class Statement {
  public:
   Statement(sqlite3* connection, const std::string& sql) {
-    sqlite3_prepare_v2(connection, sql.c_str(), -1, &statement_, nullptr);
+    Sqlite().prepare_v2(connection, sql.c_str(), -1, &statement_, nullptr);
   }
   Statement(const Statement&) = delete;
   Statement& operator=(const Statement&) = delete;
-  ~Statement() { sqlite3_finalize(statement_); }
+  ~Statement() { Sqlite().finalize(statement_); }
 
   bool valid() const { return statement_ != nullptr; }
-  void Bind(int at, int64_t value) { sqlite3_bind_int64(statement_, at, value); }
+  void Bind(int at, int64_t value) { Sqlite().bind_int64(statement_, at, value); }
   void Bind(int at, const std::string& text) {
-    sqlite3_bind_text(statement_, at, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
+    Sqlite().bind_text(statement_, at, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
   }
   // `bytes` lives until the statement ends.
   void BindBlob(int at, const void* bytes, size_t size) {
-    sqlite3_bind_blob(statement_, at, bytes, static_cast<int>(size), SQLITE_STATIC);
+    Sqlite().bind_blob(statement_, at, bytes, static_cast<int>(size), SQLITE_STATIC);
   }
-  int Step() { return sqlite3_step(statement_); }
-  int64_t Integer(int column) { return sqlite3_column_int64(statement_, column); }
+  int Step() { return Sqlite().step(statement_); }
+  int64_t Integer(int column) { return Sqlite().column_int64(statement_, column); }
   std::string Blob(int column) {
-    const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_, column));
-    return bytes == nullptr ? "" : std::string(bytes, static_cast<size_t>(sqlite3_column_bytes(statement_, column)));
+    const auto* bytes = static_cast<const char*>(Sqlite().column_blob(statement_, column));
+    return bytes == nullptr ? "" : std::string(bytes, static_cast<size_t>(Sqlite().column_bytes(statement_, column)));
   }
   std::string Text(int column) {
-    const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
+    const auto* text = reinterpret_cast<const char*>(Sqlite().column_text(statement_, column));
     return text == nullptr ? "" : text;
   }
 
@@ -66,11 +67,12 @@ std::string Parameters(const CameraGroup& group) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ColmapDatabase>> ColmapDatabase::Open(const std::string& path) {
+  MW_RETURN_IF_ERROR(LoadSqlite());
   auto database = std::unique_ptr<ColmapDatabase>(new ColmapDatabase(path));
-  if (sqlite3_open_v2(path.c_str(), &database->connection_, SQLITE_OPEN_READWRITE, nullptr) != SQLITE_OK) {
+  if (Sqlite().open_v2(path.c_str(), &database->connection_, SQLITE_OPEN_READWRITE, nullptr) != SQLITE_OK) {
     return database->Error();
   }
-  sqlite3_busy_timeout(database->connection_, kLockTimeoutMs);
+  Sqlite().busy_timeout(database->connection_, kLockTimeoutMs);
   MW_ASSIGN_OR_RETURN(const std::vector<int64_t> rigs,
                       database->Integers("SELECT count(*) FROM sqlite_master WHERE name = 'rigs'"));
   if (rigs.front() > 0) {
@@ -80,14 +82,14 @@ absl::StatusOr<std::unique_ptr<ColmapDatabase>> ColmapDatabase::Open(const std::
   return database;
 }
 
-ColmapDatabase::~ColmapDatabase() { sqlite3_close(connection_); }
+ColmapDatabase::~ColmapDatabase() { Sqlite().close(connection_); }
 
 absl::Status ColmapDatabase::Error() const {
-  return absl::InternalError(absl::StrCat(path_, ": ", sqlite3_errmsg(connection_)));
+  return absl::InternalError(absl::StrCat(path_, ": ", Sqlite().errmsg(connection_)));
 }
 
 absl::Status ColmapDatabase::Execute(const std::string& sql) {
-  if (sqlite3_exec(connection_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) return Error();
+  if (Sqlite().exec(connection_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) return Error();
   return absl::OkStatus();
 }
 
