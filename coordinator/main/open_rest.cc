@@ -2,10 +2,14 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 
+#include "pipeline/config/parse_config.h"
 #include "pipeline/options/options_json.h"
+#include "pipeline/texturing/texture_mesh.h"
 
 #include "common/base/status_macros.h"
+#include "common/mesh/ply.h"
 
 namespace meshwright {
 namespace {
@@ -23,12 +27,20 @@ std::string FindPage() {
   return "";
 }
 
+absl::Status Write(const TextureRequest& request, ThreadPool& pool) {
+  MW_ASSIGN_OR_RETURN(const ReconstructionConfig config, ParseConfig(request.options_json));
+  MW_ASSIGN_OR_RETURN(TriangleMesh mesh, ReadPly(request.ply_path));
+  TextureOptions options;
+  options.max_image_size = config.max_image_size;
+  return WriteTexturedMesh(std::move(mesh), *request.scene, options, *request.format, request.path, pool).status();
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& settings,
                                                      ReconstructionService& reconstructions, WorkerService& workers,
                                                      BlobStore& blobs, JobStore& store, Gatekeeper& gate,
-                                                     const Logger& log) {
+                                                     ThreadPool& pool, const Logger& log) {
   if (settings.rest_listen.empty()) return nullptr;
   RestOptions options = {.listen = settings.rest_listen,
                          .folder = settings.data_folder + "/rest",
@@ -41,7 +53,8 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
                            .workers = &workers,
                            .blobs = &blobs,
                            .gate = &gate,
-                           .options_json = DescribeOptionsForRest()};
+                           .options_json = DescribeOptionsForRest(),
+                           .write_textured = [&pool](const TextureRequest& request) { return Write(request, pool); }};
   services.ready = [&blobs, &store]() -> absl::Status {
     MW_RETURN_IF_ERROR(store.Now().status());
     // No blob has this digest; who says so can be reached.

@@ -20,7 +20,7 @@ namespace meshwright {
 absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& settings,
                                                      ReconstructionService& reconstructions, WorkerService& workers,
                                                      BlobStore& blobs, JobStore& store, Gatekeeper& gate,
-                                                     const Logger& log);
+                                                     ThreadPool& pool, const Logger& log);
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

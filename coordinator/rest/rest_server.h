@@ -9,6 +9,8 @@
 #include <absl/status/statusor.h>
 
 #include "common/blob/blob_store.h"
+#include "common/mesh/formats/mesh_format.h"
+#include "common/scene/scene.h"
 #include "coordinator/api/reconstruction_service.h"
 #include "coordinator/auth/gatekeeper.h"
 #include "coordinator/dispatch/worker_service.h"
@@ -29,6 +31,16 @@ struct RestOptions {
   std::function<void(const std::string&)> warn = [](const std::string&) {};
 };
 
+// Gives a mesh a texture cut from the scene's photographs, whose image_path are files, and writes it in the format.
+struct TextureRequest {
+  std::string ply_path;
+  const Scene* scene = nullptr;
+  std::string options_json;  // of the reconstruction
+  const MeshFormat* format = nullptr;
+  std::string path;
+};
+using WriteTextured = std::function<absl::Status(const TextureRequest& request)>;
+
 // What the server is a shell over. All of it outlives the server.
 struct RestServices {
   ReconstructionService* reconstructions = nullptr;
@@ -37,6 +49,7 @@ struct RestServices {
   Gatekeeper* gate = nullptr;
   std::function<absl::Status()> ready;  // whether store and blobs can be reached
   std::string options_json;             // the answer of GET /v1/options
+  WriteTextured write_textured;
 };
 
 // The public interface over HTTP, as openapi.yaml says, and the dashboard's files: a thin shell over the service.

@@ -122,6 +122,50 @@ absl::Status SendPartialMesh(const RestContext& context, RestCall& call, const M
   return SendFile(call, std::move(file), key, format.media_type, absl::StrCat(id, "-partial", format.ending));
 }
 
+// The scene, its photographs as files in `folder`.
+absl::StatusOr<Scene> LayOutScene(const RestContext& context, const std::string& id, const std::string& folder) {
+  MW_ASSIGN_OR_RETURN(Scene scene, context.reconstructions->LoadScene(id));
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return absl::PermissionDeniedError(absl::StrCat(folder, ": cannot make the folder: ", error.message()));
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    SceneView& view = scene.views[i];
+    const std::string path = absl::StrCat(folder, "/", i, std::filesystem::path(view.name).extension().string());
+    MW_RETURN_IF_ERROR(context.blobs->GetFile(view.image_path, path));
+    view.image_path = path;
+    if (view.mask_path.empty()) continue;
+    const std::string mask =
+        absl::StrCat(folder, "/", i, ".mask", std::filesystem::path(view.mask_path).extension().string());
+    MW_RETURN_IF_ERROR(context.blobs->GetFile(view.mask_path, mask));
+    view.mask_path = mask;
+  }
+  return scene;
+}
+
+// The mesh, few triangles with a texture cut from the photographs.
+absl::Status SendTextured(const RestContext& context, RestCall& call, const MeshFormat& format) {
+  const std::string& id = call.path.at("id");
+  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, context.reconstructions->Get(id));
+  MW_ASSIGN_OR_RETURN(const std::string ply_path, context.reconstructions->MeshPath(id));
+  const std::string key = absl::StrCat("textured-", format.name, "-", id, "-", reconstruction.mesh_sha256());
+  MW_ASSIGN_OR_RETURN(auto file, context.textured->Get(key, [&](const std::string& path) -> absl::Status {
+    const std::string folder = path + ".photographs";
+    absl::StatusOr<Scene> scene = LayOutScene(context, id, folder);
+    absl::Status written = scene.status();
+    if (written.ok()) {
+      written = context.write_textured({.ply_path = ply_path,
+                                        .scene = &*scene,
+                                        .options_json = reconstruction.options_json(),
+                                        .format = &format,
+                                        .path = path});
+    }
+    std::error_code error;
+    std::filesystem::remove_all(folder, error);
+    return written;
+  }));
+  return SendFile(call, std::move(file), key, format.media_type, absl::StrCat(id, "-textured", format.ending));
+}
+
 absl::StatusOr<const MeshFormat*> QueryFormat(const RestCall& call) {
   constexpr char kName[] = "format";
   if (!call.request.HasParam(kName)) return &MeshFormats().front();
@@ -144,6 +188,13 @@ absl::Status SendMesh(const RestContext& context, RestCall& call, const MeshForm
 absl::Status DownloadMesh(const RestContext& context, RestCall& call) {
   MW_ASSIGN_OR_RETURN(const bool partial, QueryFlag(call, "partial"));
   MW_ASSIGN_OR_RETURN(const MeshFormat* format, QueryFormat(call));
+  MW_ASSIGN_OR_RETURN(const bool texture, QueryFlag(call, "texture"));
+  if (texture && (partial || std::string(format->name) != "glb")) {
+    return FieldError(
+        "texture",
+        absl::InvalidArgumentError("texture is true, expected format=glb with it, which is one file, and not partial"));
+  }
+  if (texture) return SendTextured(context, call, *format);
   return SendMesh(context, call, *format, partial);
 }
 
@@ -168,7 +219,7 @@ void AddResultRoutes(const RestContext& context, std::vector<Route>& routes) {
   add("/v1/reconstructions/{id}/parts/{sequence}", {}, DownloadPart);
   add("/v1/reconstructions/{id}/parts/{sequence}/surface", {}, DownloadSurface);
   add("/v1/reconstructions/{id}/parts/{sequence}/preview", {"max_faces"}, PreviewPart);
-  add("/v1/reconstructions/{id}/mesh", {"partial", "format"}, DownloadMesh);
+  add("/v1/reconstructions/{id}/mesh", {"partial", "format", "texture"}, DownloadMesh);
   add("/v1/reconstructions/{id}/mesh.glb", {}, DownloadGlb);
   add("/v1/formats", {}, ListFormats);
 }

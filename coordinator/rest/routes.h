@@ -12,6 +12,7 @@
 #include "coordinator/dispatch/worker_service.h"
 #include "coordinator/rest/downloads.h"
 #include "coordinator/rest/event_feeds.h"
+#include "coordinator/rest/rest_server.h"
 #include "coordinator/rest/router.h"
 #include "coordinator/rest/scene_uploads.h"
 
@@ -25,9 +26,11 @@ struct RestContext {
   Gatekeeper* gate = nullptr;
   SceneUploads* uploads = nullptr;
   DerivedFiles* derived = nullptr;
+  DerivedFiles* textured = nullptr;  // which take long, so that the others do not wait for them
   EventFeeds* feeds = nullptr;
   std::function<absl::Status()> ready;
   std::string options_json;  // the answer of GET /v1/options
+  WriteTextured write_textured;
 };
 
 // Handlers of the paths in the OpenAPI file, by what they are about.

@@ -157,6 +157,8 @@ TEST_F(MalformedCallsTest, OverHttp) {
       {"GET", there + "/mesh", "", 409, "", "one that is done"},
       {"GET", there + "/mesh?partial=yes", "", 400, "partial", "true or false"},
       {"GET", there + "/mesh?format=docx", "", 400, "format", "ply, glb"},
+      {"GET", there + "/mesh?format=obj&texture=true", "", 400, "texture", "format=glb"},
+      {"GET", there + "/mesh?texture=true", "", 400, "texture", "format=glb"},
       {"GET", there + "/mesh.glb", "", 409, "", "one that is done"},
   };
   for (const Case& c : cases) {

@@ -136,6 +136,10 @@ TEST_F(RestTest, FromAnInterruptedUploadToTheMesh) {
   const auto head = http_->Head(base + "/mesh");
   EXPECT_EQ(head->get_header_value("Content-Length"), std::to_string(mesh->body.size()));
   EXPECT_THAT(http_->Get(base + "/mesh.glb")->body, StartsWith("glTF"));
+  const auto textured = http_->Get(base + "/mesh?format=glb&texture=true");
+  ASSERT_TRUE(textured && textured->status == 200) << (textured ? textured->body : "");
+  EXPECT_EQ(textured->body.substr(0, 4), "glTF");
+  EXPECT_NE(textured->body.find("TEXCOORD_0"), std::string::npos);
   const Json formats = GetJson("/v1/formats")["formats"];
   ASSERT_GE(formats.size(), 5U);
   for (const Json& format : formats) {

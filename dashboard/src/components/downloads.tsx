@@ -43,6 +43,14 @@ export function Downloads({ base, reconstruction, hasParts }: Props) {
       <ul>
         {failure !== '' && <li class="muted small">{failure}</li>}
         {done &&
+          formats.some(({ name }) => name === 'glb') &&
+          link(
+            `${base}/mesh?format=glb&texture=true`,
+            `${id}-textured.glb`,
+            'Mesh with a texture, GLB',
+            'few triangles, cut from the photographs; made when asked for, which may take minutes',
+          )}
+        {done &&
           formats.map(({ name, ending, title, note }) =>
             link(
               name === 'ply' ? `${base}/mesh` : `${base}/mesh?format=${name}`,
