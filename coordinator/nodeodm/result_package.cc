@@ -15,6 +15,7 @@
 #include "common/json/json_text.h"
 #include "common/json/parse_json.h"
 #include "common/mesh/formats/mesh_format.h"
+#include "coordinator/api/photograph_files.h"
 #include "coordinator/nodeodm/odm_cameras.h"
 
 namespace meshwright {
@@ -112,15 +113,9 @@ class Maker {
   absl::Status MakeModel() {
     MW_ASSIGN_OR_RETURN(const std::string model, PathOf(kModel));
     const fs::path photographs = fs::path(folder_) / kPhotographs;
-    std::error_code error;
-    fs::create_directories(photographs, error);
-    Scene scene = scene_;
-    for (size_t i = 0; i < scene.views.size(); ++i) {
-      const std::string path = (photographs / absl::StrCat(i)).string();
-      MW_RETURN_IF_ERROR(sources_.blobs->GetFile(scene.views[i].image_path, path));
-      scene.views[i].image_path = path;
-    }
+    MW_ASSIGN_OR_RETURN(const Scene scene, WithPhotographFiles(scene_, *sources_.blobs, photographs.string()));
     const absl::Status textured = sources_.write_textured_glb(scene, reconstruction_.options_json(), ply_path_, model);
+    std::error_code error;
     fs::remove_all(photographs, error);
     if (!absl::IsFailedPrecondition(textured)) return textured;
     MW_ASSIGN_OR_RETURN(const MeshFormat* glb, MeshFormatByName("glb"));

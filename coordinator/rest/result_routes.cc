@@ -12,6 +12,7 @@
 #include "common/mesh/ply.h"
 #include "common/mesh/surface_mesh.h"
 #include "common/surface/codec.h"
+#include "coordinator/api/photograph_files.h"
 #include "coordinator/rest/json.h"
 #include "coordinator/rest/part_preview.h"
 #include "coordinator/rest/problem.h"
@@ -122,26 +123,6 @@ absl::Status SendPartialMesh(const RestContext& context, RestCall& call, const M
   return SendFile(call, std::move(file), key, format.media_type, absl::StrCat(id, "-partial", format.ending));
 }
 
-// The scene, its photographs as files in `folder`.
-absl::StatusOr<Scene> LayOutScene(const RestContext& context, const std::string& id, const std::string& folder) {
-  MW_ASSIGN_OR_RETURN(Scene scene, context.reconstructions->LoadScene(id));
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return absl::PermissionDeniedError(absl::StrCat(folder, ": cannot make the folder: ", error.message()));
-  for (size_t i = 0; i < scene.views.size(); ++i) {
-    SceneView& view = scene.views[i];
-    const std::string path = absl::StrCat(folder, "/", i, std::filesystem::path(view.name).extension().string());
-    MW_RETURN_IF_ERROR(context.blobs->GetFile(view.image_path, path));
-    view.image_path = path;
-    if (view.mask_path.empty()) continue;
-    const std::string mask =
-        absl::StrCat(folder, "/", i, ".mask", std::filesystem::path(view.mask_path).extension().string());
-    MW_RETURN_IF_ERROR(context.blobs->GetFile(view.mask_path, mask));
-    view.mask_path = mask;
-  }
-  return scene;
-}
-
 // The mesh, few triangles with a texture cut from the photographs.
 absl::Status SendTextured(const RestContext& context, RestCall& call, const MeshFormat& format) {
   const std::string& id = call.path.at("id");
@@ -150,7 +131,8 @@ absl::Status SendTextured(const RestContext& context, RestCall& call, const Mesh
   const std::string key = absl::StrCat("textured-", format.name, "-", id, "-", reconstruction.mesh_sha256());
   MW_ASSIGN_OR_RETURN(auto file, context.textured->Get(key, [&](const std::string& path) -> absl::Status {
     const std::string folder = path + ".photographs";
-    absl::StatusOr<Scene> scene = LayOutScene(context, id, folder);
+    absl::StatusOr<Scene> scene = context.reconstructions->LoadScene(id);
+    if (scene.ok()) scene = WithPhotographFiles(*std::move(scene), *context.blobs, folder);
     absl::Status written = scene.status();
     if (written.ok()) {
       written = context.write_textured({.ply_path = ply_path,
