@@ -73,9 +73,10 @@ test('the mesh grows while one looks at it', async (t) => {
     const numbers = await meshNumbers(page);
     return numbers.shown > 0 && numbers;
   });
+  // How many faces are shown says nothing here: their number falls when frames are slow.
   const then = await until(async () => {
     const numbers = await meshNumbers(page);
-    return numbers.parts >= first.parts + 10 && numbers.shown > first.shown && numbers;
+    return numbers.parts >= first.parts + 10 && numbers.shown > 0 && numbers;
   });
   assert.ok(then.faces > first.faces);
   const seen = Number((await page.locator('.summary dd').first().textContent()).split(' ')[0]);
