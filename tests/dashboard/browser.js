@@ -101,7 +101,7 @@ export async function looksOfCanvas(page) {
   }, png.toString('base64'));
 }
 
-export async function until(condition, { timeout = 20_000, every = 100, what = String(condition) } = {}) {
+export async function until(condition, { timeout = 45_000, every = 100, what = String(condition) } = {}) {
   const deadline = Date.now() + timeout;
   for (;;) {
     const value = await condition();
