@@ -189,6 +189,7 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
                                                                   .options = &task_options_,
                                                                   .clock = services_.clock,
                                                                   .write_textured_glb = services_.write_textured_glb,
+                                                                  .can_estimate_cameras = [this] { return CanEstimateCameras(); },
                                                                   .max_images = options_.max_images,
                                                                   .warn = options_.warn}));
     const int cores = static_cast<int>(std::thread::hardware_concurrency());
@@ -212,6 +213,12 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
   }
 
  private:
+  bool CanEstimateCameras() const {
+    const v1::ListWorkersResponse workers = services_.workers->ListWorkers();
+    return std::any_of(workers.workers().begin(), workers.workers().end(),
+                       [](const v1::Worker& worker) { return !worker.colmap_version().empty(); });
+  }
+
   // Clients take a node that does not answer at once for dead. These wait for neither the store nor the disk.
   bool IsQuick(const HttpRequest& request) const override {
     return request.method == "GET" && !absl::EndsWith(request.path, ".zip");

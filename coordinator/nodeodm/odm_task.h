@@ -31,6 +31,7 @@ struct OdmTask {
   int longest_side_px = 0;  // of all photographs
   int64_t parts_told = 0;   // sequence of the last part that the output tells of
   bool has_result = false;  // files of all.zip are there
+  std::string stage_told;   // the last stage before the first camera that the output tells of; not kept in the file
 };
 
 // "dc1a4b08-....": lower case, 8-4-4-4-12.

@@ -35,11 +35,9 @@ constexpr double kAtPacking = 95;
 constexpr double kMinProgressStep = 0.1;
 
 constexpr char kCamerasNeeded[] =
-    "Cameras are needed: photographs alone cannot be processed by this node yet. Send the model of their cameras among "
-    "the "
-    "images, e.g. COLMAP's cameras.txt, images.txt and points3D.txt (or .bin), Middlebury's _par.txt or Strecha's "
-    ".camera "
-    "files; photographs are matched by their names";
+    "Photographs alone need a worker with COLMAP, and none is connected. Start one, or send the model of the cameras among "
+    "the images, e.g. COLMAP's cameras.txt, images.txt and points3D.txt (or .bin), Middlebury's _par.txt or Strecha's "
+    ".camera files; photographs are matched by their names";
 
 absl::Status Unknown() { return absl::NotFoundError("Invalid uuid (not found)"); }
 
@@ -359,6 +357,7 @@ absl::Status TaskBoard::Restart(const std::string& uuid, const std::optional<std
     now.error.clear();
     now.progress = 0;
     now.parts_told = 0;
+    now.stage_told.clear();
     now.has_result = false;
     lines.push_back(absl::StrCat("Meshwright ", kProgramVersion, ", started again"));
   }));
@@ -417,6 +416,8 @@ void TaskBoard::Look(const OdmTask& task) {
       }
       return;
     }
+    case v1::RECONSTRUCTION_STATE_PREPARING:
+      return TellStage(task, reconstruction->stage());
     case v1::RECONSTRUCTION_STATE_RUNNING:
     case v1::RECONSTRUCTION_STATE_JOINING:
       return Progress(task, *reconstruction);
@@ -441,7 +442,7 @@ absl::Status TaskBoard::StartRun(const OdmTask& task) {
                       services_.reconstructions->ListSceneFiles(ReconstructionOf(task)));
   const bool has_cameras = std::any_of(
       files.begin(), files.end(), [](const SceneFile& file) { return KindOfFile(file.path) == OdmFileKind::kCameras; });
-  if (!has_cameras) return absl::FailedPreconditionError(kCamerasNeeded);
+  if (!has_cameras && !services_.can_estimate_cameras()) return absl::FailedPreconditionError(kCamerasNeeded);
   MW_ASSIGN_OR_RETURN(const OdmTaskOptions options, services_.options->Parse(JsonText(task.options)));
   OdmTask run = task;
   // How large the photographs are was not known when the task began.
@@ -455,6 +456,19 @@ absl::Status TaskBoard::StartRun(const OdmTask& task) {
     lines.push_back(absl::StrCat(task.images, " photographs of up to ", task.longest_side_px, " px; options ",
                                  OwnOptionsJson(options, task.longest_side_px)));
   });
+}
+
+void TaskBoard::TellStage(const OdmTask& task, const std::string& stage) {
+  // "cameras: matching photographs, 43 %": told once each, less the number that moves.
+  const std::string words = stage.substr(0, stage.find_last_of(','));
+  if (words.empty()) return;
+  Update(task.uuid, [&](OdmTask& now, std::vector<std::string>& lines) {
+    if (now.run != task.run || HasEnded(now) || now.stage_told == words) return;
+    if (now.begun_ms == 0) now.begun_ms = now_ms();
+    now.status = OdmStatus::kRunning;
+    now.stage_told = words;
+    lines.push_back(words);
+  }).IgnoreError();
 }
 
 void TaskBoard::Progress(const OdmTask& task, const v1::Reconstruction& reconstruction) {

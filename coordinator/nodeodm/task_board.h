@@ -50,7 +50,8 @@ class TaskBoard {
     const OdmOptions* options = nullptr;
     const Clock* clock = nullptr;
     WriteTexturedGlb write_textured_glb;
-    int max_images = 0;  // of a task; 0: any number
+    std::function<bool()> can_estimate_cameras;  // whether a worker with COLMAP is there
+    int max_images = 0;                          // of a task; 0: any number
     std::function<void(const std::string&)> warn;
   };
 
@@ -110,6 +111,7 @@ class TaskBoard {
   void Look(const OdmTask& task);
   absl::Status StartRun(const OdmTask& task);
   absl::Status Again(const OdmTask& from, OdmTask& to, const OdmTaskOptions& options);
+  void TellStage(const OdmTask& task, const std::string& stage);
   void Progress(const OdmTask& task, const v1::Reconstruction& reconstruction);
   void End(const OdmTask& task, OdmStatus status, const std::string& error);
   void Pack();
