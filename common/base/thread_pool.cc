@@ -14,8 +14,8 @@ struct ThreadPool::Loop {
   const std::function<void(int64_t, int64_t)>* body = nullptr;
   std::atomic<int64_t> next{0};
   std::atomic<int64_t> finished{0};
-  std::mutex mutex;
-  std::condition_variable all_done;
+  Mutex mutex;
+  ConditionVariable all_done;
 };
 
 ThreadPool::ThreadPool(int threads) {
@@ -25,10 +25,10 @@ ThreadPool::ThreadPool(int threads) {
 
 ThreadPool::~ThreadPool() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   for (std::thread& helper : helpers_) helper.join();
 }
 
@@ -39,21 +39,21 @@ void ThreadPool::Work(Loop& loop) {
     const int64_t begin = piece * loop.grain;
     (*loop.body)(begin, std::min(loop.count, begin + loop.grain));
     if (loop.finished.fetch_add(1) + 1 == loop.pieces) {
-      const std::lock_guard<std::mutex> lock(loop.mutex);
-      loop.all_done.notify_all();
+      const MutexLock lock(loop.mutex);
+      loop.all_done.NotifyAll();
     }
   }
 }
 
 void ThreadPool::HelperMain() {
-  std::unique_lock<std::mutex> lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
-    wake_.wait(lock, [this] { return stopping_ || !loops_.empty(); });
+    while (!stopping_ && loops_.empty()) wake_.Wait(lock);
     if (stopping_) return;
     const std::shared_ptr<Loop> loop = loops_.front();
-    lock.unlock();
+    lock.Unlock();
     Work(*loop);
-    lock.lock();
+    lock.Lock();
     // All pieces of this loop are taken: nobody else needs to look at it.
     const auto it = std::find(loops_.begin(), loops_.end(), loop);
     if (it != loops_.end()) loops_.erase(it);
@@ -70,16 +70,16 @@ void ThreadPool::ParallelFor(int64_t count, int64_t grain, const std::function<v
   loop->body = &body;
   if (loop->pieces > 1 && !helpers_.empty()) {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       loops_.push_back(loop);
     }
-    wake_.notify_all();
+    wake_.NotifyAll();
   }
   Work(*loop);
-  std::unique_lock<std::mutex> lock(loop->mutex);
-  loop->all_done.wait(lock, [&] { return loop->finished.load() == loop->pieces; });
-  lock.unlock();
-  const std::lock_guard<std::mutex> pool_lock(mutex_);
+  MutexLock lock(loop->mutex);
+  while (loop->finished.load() != loop->pieces) loop->all_done.Wait(lock);
+  lock.Unlock();
+  const MutexLock pool_lock(mutex_);
   const auto it = std::find(loops_.begin(), loops_.end(), loop);
   if (it != loops_.end()) loops_.erase(it);
 }

@@ -74,7 +74,7 @@ absl::StatusOr<std::unique_ptr<ReconstructionService>> ReconstructionService::Op
   }
   auto service = std::unique_ptr<ReconstructionService>(new ReconstructionService(options, environment, workers));
   workers.SetListener([raw = service.get()](const std::string& id) {
-    const std::lock_guard<std::mutex> lock(raw->mutex_);
+    const MutexLock lock(raw->mutex_);
     const auto found = raw->conducted_.find(id);
     if (found != raw->conducted_.end()) found->second->Wake();
   });
@@ -98,24 +98,24 @@ ReconstructionService::~ReconstructionService() {
 
 void ReconstructionService::Changed(bool look) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     ++version_;
     look_ = look_ || look;
   }
-  changed_.notify_all();
-  if (look) overseer_wake_.notify_all();
+  changed_.NotifyAll();
+  if (look) overseer_wake_.NotifyAll();
 }
 
 void ReconstructionService::Oversee() {
-  const auto every = absl::ToChronoMilliseconds(options_.conductor_lease / kLooksPerLease);
-  std::unique_lock<std::mutex> lock(mutex_);
+  const auto every = absl::ToChronoNanoseconds(options_.conductor_lease / kLooksPerLease);
+  MutexLock lock(mutex_);
   while (!stopping_) {
     look_ = false;
-    lock.unlock();
+    lock.Unlock();
     // A store that is away comes back, or everything else fails too.
     OverseeOnce().IgnoreError();
-    lock.lock();
-    overseer_wake_.wait_for(lock, every, [&] { return stopping_ || look_; });
+    lock.Lock();
+    if (!stopping_ && !look_) overseer_wake_.WaitFor(lock, every);
   }
 }
 
@@ -127,7 +127,7 @@ absl::Status ReconstructionService::OverseeOnce() {
   std::vector<std::unique_ptr<ReconstructionDriver>> ended;
   std::vector<std::string> ended_ids;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     for (auto it = conducted_.begin(); it != conducted_.end();) {
       ReconstructionDriver& conducted = *it->second;
       const auto found = by_id.find(it->first);
@@ -156,7 +156,7 @@ absl::Status ReconstructionService::TakeUp(const ConductedState& state, absl::Ti
   if (!is_of_ours && state.state != ReconstructionState::kDeleting) return absl::OkStatus();
   HeldConductorLease* held = nullptr;  // touched by this thread alone, as is what owns it
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto found = conducted_.find(state.id);
     if (found != conducted_.end()) {
       ReconstructionDriver& conducted = *found->second;
@@ -179,7 +179,7 @@ absl::Status ReconstructionService::TakeUp(const ConductedState& state, absl::Ti
   // Another coordinator was quicker, or it is gone.
   if (absl::IsFailedPrecondition(lease.status()) || absl::IsNotFound(lease.status())) return absl::OkStatus();
   MW_RETURN_IF_ERROR(lease.status());
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   conducted_[state.id] = std::make_unique<ReconstructionDriver>(environment_, folders_, state.id, *std::move(lease),
                                                                 state.state == ReconstructionState::kDeleting,
                                                                 [this](bool has_ended) { Changed(has_ended); });
@@ -197,7 +197,7 @@ bool ReconstructionService::IsAbandoned(const ConductedState& state) {
 
 void ReconstructionService::StopConducting(const std::string& id) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto found = conducted_.find(id);
     if (found != conducted_.end()) found->second->RequestStop();
   }
@@ -483,13 +483,13 @@ absl::StatusOr<v1::ListAttemptsResponse> ReconstructionService::ListAttempts(
 
 absl::StatusOr<Eigen::Vector3d> ReconstructionService::OffsetOf(const std::string& id) const {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (const auto known = offsets_.find(id); known != offsets_.end()) return known->second;
   }
   const absl::StatusOr<Scene> scene = LoadScene(id);
   if (absl::IsFailedPrecondition(scene.status())) return Eigen::Vector3d(Eigen::Vector3d::Zero());  // none taken yet
   MW_RETURN_IF_ERROR(scene.status());
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return offsets_[id] = scene->offset;
 }
 
@@ -540,7 +540,7 @@ absl::Status ReconstructionService::Watch(const std::string& id, const std::func
   while (true) {
     int64_t version = 0;
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       if (stopping_) return absl::UnavailableError("the coordinator is going down");
       version = version_;
     }
@@ -551,19 +551,19 @@ absl::Status ReconstructionService::Watch(const std::string& id, const std::func
       if (IsOver(reconstruction.state())) return absl::OkStatus();
       told = std::move(now);
     }
-    std::unique_lock<std::mutex> lock(mutex_);
+    MutexLock lock(mutex_);
     // Other coordinators change things too.
-    changed_.wait_for(lock, kLookAgain, [&] { return stopping_ || version_ != version; });
+    if (!stopping_ && version_ == version) changed_.WaitFor(lock, kLookAgain);
   }
 }
 
 void ReconstructionService::Shutdown() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  changed_.notify_all();
-  overseer_wake_.notify_all();
+  changed_.NotifyAll();
+  overseer_wake_.NotifyAll();
 }
 
 }  // namespace meshwright

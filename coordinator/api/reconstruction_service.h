@@ -1,10 +1,8 @@
 #pragma once
 
-#include <condition_variable>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -16,6 +14,7 @@
 #include "meshwright/v1/reconstruction.pb.h"
 
 #include "common/base/method_version.h"
+#include "common/base/mutex.h"
 #include "coordinator/api/reconstruction_record.h"
 #include "coordinator/api/scene_upload.h"
 #include "coordinator/conductor/reconstruction_driver.h"
@@ -113,14 +112,14 @@ class ReconstructionService {
   const CoordinatorFolders folders_;
   const DriverEnvironment environment_;
   WorkerService& workers_;
-  mutable std::mutex mutex_;
-  mutable std::map<std::string, Eigen::Vector3d> offsets_;  // of scenes that were looked at
-  mutable std::condition_variable changed_;
-  int64_t version_ = 0;                                                     // grows when something may have changed
-  std::map<std::string, std::unique_ptr<ReconstructionDriver>> conducted_;  // here
-  bool look_ = false;                                                       // the overseer should look now
-  bool stopping_ = false;
-  std::condition_variable overseer_wake_;
+  mutable Mutex mutex_;
+  mutable std::map<std::string, Eigen::Vector3d> offsets_ ABSL_GUARDED_BY(mutex_);  // of scenes that were looked at
+  mutable ConditionVariable changed_;
+  int64_t version_ ABSL_GUARDED_BY(mutex_) = 0;  // grows when something may have changed
+  std::map<std::string, std::unique_ptr<ReconstructionDriver>> conducted_ ABSL_GUARDED_BY(mutex_);  // here
+  bool look_ ABSL_GUARDED_BY(mutex_) = false;  // the overseer should look now
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  ConditionVariable overseer_wake_;
   // Of the overseer alone: leases as they stood, and since when.
   struct SeenLease {
     int64_t epoch = 0;

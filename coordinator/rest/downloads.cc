@@ -103,7 +103,7 @@ absl::StatusOr<std::unique_ptr<DerivedFiles>> DerivedFiles::Open(const std::stri
 absl::StatusOr<std::shared_ptr<const OpenedFile>> DerivedFiles::Get(
     const std::string& key, const std::function<absl::Status(const std::string&)>& make) {
   const std::string path = absl::StrCat(folder_, "/", Sha256Hex(key));
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (last_use_.count(path) == 0) {
     MW_RETURN_IF_ERROR(make(path));
     while (last_use_.size() >= kFilesKept) {

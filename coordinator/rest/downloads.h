@@ -4,12 +4,12 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "common/base/mutex.h"
 #include "common/base/opened_file.h"
 #include "coordinator/rest/router.h"
 
@@ -41,9 +41,9 @@ class DerivedFiles {
  private:
   explicit DerivedFiles(std::string folder) : folder_(std::move(folder)) {}
   const std::string folder_;
-  std::mutex mutex_;
-  int64_t uses_ = 0;
-  std::map<std::string, int64_t> last_use_;  // path -> the last one of uses_
+  Mutex mutex_;
+  int64_t uses_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::map<std::string, int64_t> last_use_ ABSL_GUARDED_BY(mutex_);  // path -> the last one of uses_
 };
 
 }  // namespace meshwright

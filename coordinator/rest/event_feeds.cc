@@ -54,15 +54,15 @@ EventFeeds::~EventFeeds() {
 
 void EventFeeds::Shutdown() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
     for (const auto& [id, feed] : feeds_) feed->Wake();
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
 }
 
 int EventFeeds::streams() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return streams_;
 }
 
@@ -71,7 +71,7 @@ absl::StatusOr<std::unique_ptr<EventFeeds::Stream>> EventFeeds::Open(const std::
   MW_RETURN_IF_ERROR(service_.Get(id).status());
   std::unique_ptr<Stream> stream;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (stopping_) return absl::UnavailableError("the coordinator is going down");
     if (streams_ >= options_.max_streams) {
       return absl::UnavailableError(absl::StrCat("there are ", streams_, " event streams, expected fewer than ",
@@ -89,28 +89,29 @@ absl::StatusOr<std::unique_ptr<EventFeeds::Stream>> EventFeeds::Open(const std::
     stream = std::unique_ptr<Stream>(new Stream(*this, id, caller, feed, after_part));
     feed->streams.insert(stream.get());
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   return stream;
 }
 
 void EventFeeds::Run() {
-  std::unique_lock<std::mutex> lock(mutex_);
+  MutexLock lock(mutex_);
   while (!stopping_) {
     const std::map<std::string, std::shared_ptr<Feed>> watched = feeds_;
-    lock.unlock();
+    lock.Unlock();
     bool changing = false;
     for (const auto& [id, feed] : watched) changing = Look(id, *feed) || changing;
-    lock.lock();
-    const auto fresh = [&] {
-      return stopping_ ||
-             std::any_of(feeds_.begin(), feeds_.end(), [](const auto& entry) { return !entry.second->looked; });
-    };
+    lock.Lock();
+    if (stopping_ || HasNewFeed()) continue;
     if (changing) {
-      wake_.wait_for(lock, absl::ToChronoMilliseconds(LookAgain()), fresh);
+      wake_.WaitFor(lock, absl::ToChronoNanoseconds(LookAgain()));
     } else {
-      wake_.wait(lock, fresh);
+      wake_.Wait(lock);
     }
   }
+}
+
+bool EventFeeds::HasNewFeed() const {
+  return std::any_of(feeds_.begin(), feeds_.end(), [](const auto& entry) { return !entry.second->looked; });
 }
 
 // Each change is written to each stream: the more there are, the rarer, so that writing takes a bounded share of a
@@ -121,7 +122,7 @@ bool EventFeeds::Look(const std::string& id, Feed& feed) {
   int64_t committed = 0;
   SequenceNumber known = 0;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (feed.over || feed.gone) return false;
     feed.looked = true;
     committed = feed.committed;
@@ -144,7 +145,7 @@ bool EventFeeds::Look(const std::string& id, Feed& feed) {
   if (!status.ok() && !absl::IsNotFound(status)) return true;
   const std::string json = status.ok() ? ToJson(*now) : "";
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!status.ok()) {
       feed.gone = true;
       const auto found = feeds_.find(id);
@@ -170,7 +171,7 @@ EventFeeds::Stream::Stream(EventFeeds& feeds, std::string id, std::string caller
     : feeds_(feeds), id_(std::move(id)), caller_(std::move(caller)), feed_(std::move(feed)), last_part_(after_part) {}
 
 EventFeeds::Stream::~Stream() {
-  const std::lock_guard<std::mutex> lock(feeds_.mutex_);
+  const MutexLock lock(feeds_.mutex_);
   --feeds_.streams_;
   if (--feeds_.streams_of_[caller_] == 0) feeds_.streams_of_.erase(caller_);
   feed_->streams.erase(this);
@@ -180,12 +181,12 @@ EventFeeds::Stream::~Stream() {
 }
 
 void EventFeeds::Stream::SetWake(std::function<void()> wake) {
-  const std::lock_guard<std::mutex> lock(feeds_.mutex_);
+  const MutexLock lock(feeds_.mutex_);
   wake_ = std::move(wake);
 }
 
 std::optional<std::string> EventFeeds::Stream::Next() {
-  const std::lock_guard<std::mutex> lock(feeds_.mutex_);
+  const MutexLock lock(feeds_.mutex_);
   if (ended_ || feeds_.stopping_ || feed_->gone) return std::nullopt;
   std::string text;
   if (feed_->version != told_version_) {

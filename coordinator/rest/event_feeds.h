@@ -1,11 +1,9 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -15,6 +13,7 @@
 #include <absl/status/statusor.h>
 #include <absl/time/time.h>
 
+#include "common/base/mutex.h"
 #include "common/http_server/http_message.h"
 #include "coordinator/api/reconstruction_service.h"
 
@@ -72,16 +71,17 @@ class EventFeeds {
   void Run();
   // Whether there may be news later.
   bool Look(const std::string& id, Feed& feed);
-  absl::Duration LookAgain() const;
+  bool HasNewFeed() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Duration LookAgain() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const ReconstructionService& service_;
   const EventFeedOptions options_;
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;  // for the thread
-  std::map<std::string, std::shared_ptr<Feed>> feeds_;
-  std::map<std::string, int> streams_of_;  // by caller
-  int streams_ = 0;
-  bool stopping_ = false;
+  mutable Mutex mutex_;
+  ConditionVariable wake_;  // for the thread
+  std::map<std::string, std::shared_ptr<Feed>> feeds_ ABSL_GUARDED_BY(mutex_);
+  std::map<std::string, int> streams_of_ ABSL_GUARDED_BY(mutex_);  // by caller
+  int streams_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

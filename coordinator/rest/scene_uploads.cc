@@ -156,7 +156,7 @@ absl::StatusOr<std::unique_ptr<StagedBlob>> SceneUploads::Stage(const std::strin
     return StagedBlob::Open(path);
   }
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto known = digests_.find(state_path);
     if (known != digests_.end()) return StagedBlob::Open(StagedPath(state), state.offset_bytes, known->second);
   }
@@ -166,13 +166,13 @@ absl::StatusOr<std::unique_ptr<StagedBlob>> SceneUploads::Stage(const std::strin
 }
 
 void SceneUploads::Remember(const std::string& state_path, const Sha256Stream& digest) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (digests_.size() >= kMaxDigests) digests_.erase(digests_.begin());
   digests_.insert_or_assign(state_path, digest);
 }
 
 void SceneUploads::Forget(const std::string& state_path) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   digests_.erase(state_path);
 }
 
@@ -187,7 +187,7 @@ absl::StatusOr<std::unique_ptr<ScenePartUpload>> SceneUploads::Begin(const std::
   MW_RETURN_IF_ERROR(Check(part));
   const std::string state_path = StatePath(id, part.path);
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!busy_.insert(state_path).second) {
       return absl::AbortedError(absl::StrCat("another part of ", part.path, " arrives at the same time"));
     }
@@ -234,7 +234,7 @@ ScenePartUpload::~ScenePartUpload() {
     std::error_code error;
     fs::remove(staged_->path(), error);  // nobody would know of it
   }
-  const std::lock_guard<std::mutex> lock(uploads_.mutex_);
+  const MutexLock lock(uploads_.mutex_);
   uploads_.busy_.erase(state_path_);
 }
 

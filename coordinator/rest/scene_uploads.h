@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -14,6 +13,7 @@
 #include <absl/types/span.h>
 
 #include "common/base/digest.h"
+#include "common/base/mutex.h"
 #include "common/blob/staged_blob.h"
 #include "coordinator/api/reconstruction_service.h"
 
@@ -108,10 +108,10 @@ class SceneUploads {
 
   const std::string folder_;
   ReconstructionService& service_;
-  std::mutex mutex_;
-  std::set<std::string> busy_;  // state paths of the files that a part arrives for
+  Mutex mutex_;
+  std::set<std::string> busy_ ABSL_GUARDED_BY(mutex_);  // state paths of the files that a part arrives for
   // By state path: the digest so far of files that are not complete, so that nobody has to read them again.
-  std::map<std::string, Sha256Stream> digests_;
+  std::map<std::string, Sha256Stream> digests_ ABSL_GUARDED_BY(mutex_);
 };
 
 // Where a file that an error is about should go on, if that is known.
