@@ -89,7 +89,7 @@ function CurrentPage() {
     case 'workers':
       return <WorkersPage />;
     case 'submit':
-      return <SubmitPage />;
+      return <SubmitPage key={`${current.again}/${current.region}`} again={current.again} region={current.region} />;
     case 'unknown':
       return (
         <>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page against simulated reconstructions: what it shows, how it is used, who can use it.
 import assert from 'node:assert/strict';
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, beforeEach, test } from 'node:test';
@@ -154,6 +154,82 @@ test('everything can be reached and done with the keyboard alone', async (t) => 
   assert.deepEqual(await violations(page), []);
   await page.keyboard.press('Enter'); // back, which has the focus
   await page.locator('.camera-list').waitFor();
+});
+
+test('a photograph lies over the surface where its camera stood, until one moves on', async (t) => {
+  const page = await openPage(t, browser, `${base}#/reconstructions/done`);
+  await until(async () => allShown(await meshNumbers(page)));
+  const button = page.getByRole('button', { name: 'Look through' });
+  assert.ok(await button.isDisabled());
+  assert.match(await button.getAttribute('title'), /Select a camera first/);
+  await page.locator('.camera-row').nth(4).click();
+  await button.click();
+  const photograph = page.locator('.stage-photo');
+  await until(() => photograph.evaluate((image) => image.complete && image.naturalWidth > 0));
+  const [over, canvas] = [await photograph.boundingBox(), await page.locator('.stage canvas').boundingBox()];
+  assert.ok(Math.abs(over.width / over.height - 4 / 3) < 0.01, 'of the shape of the photograph');
+  assert.ok(over.x >= canvas.x - 1 && over.y >= canvas.y - 1, 'on the canvas');
+  await keepScreenshot(page, 'look-through');
+  assert.deepEqual(await violations(page), []);
+  await page.getByLabel('Photograph', { exact: true }).fill('0');
+  assert.equal(await photograph.evaluate((image) => getComputedStyle(image).opacity), '0');
+  const alone = await page.locator('.stage canvas').screenshot();
+  await page.locator('.stage canvas').press('ArrowLeft');
+  await photograph.waitFor({ state: 'detached' });
+  await until(async () => !alone.equals(await page.locator('.stage canvas').screenshot()));
+});
+
+test('a distance is measured between two points of the surface', async (t) => {
+  const page = await openPage(t, browser, `${base}#/reconstructions/done`);
+  await until(async () => allShown(await meshNumbers(page)));
+  await page.locator('.camera-row').nth(4).click();
+  await page.getByRole('button', { name: 'Look through' }).click();
+  await page.getByLabel('Photograph', { exact: true }).fill('0');
+  await page.getByRole('button', { name: 'Measure' }).click();
+  await page.getByText('Click a point of the surface').waitFor();
+  const photograph = await page.locator('.stage-photo').boundingBox();
+  const clickAt = (x, y) => page.mouse.click(photograph.x + x * photograph.width, photograph.y + y * photograph.height);
+  await clickAt(0.3, 0.5);
+  await page.getByText('Click another one').waitFor();
+  await clickAt(0.7, 0.5);
+  await page.getByText('units of the scene').waitFor();
+  await keepScreenshot(page, 'measured');
+  // Straight down from 22 units: 0.4 of 4,000 px at a focal length of 3,600 px, on hills of a few units.
+  const flat = (22 * 0.4 * 4000) / 3600;
+  const distance = Number(await page.locator('[data-distance]').getAttribute('data-distance'));
+  assert.ok(distance > 0.6 * flat && distance < 1.4 * flat, `${distance} where flat ground has ${flat}`);
+  await page.getByRole('button', { name: 'Measure' }).click();
+  await page.locator('[data-distance]').waitFor({ state: 'detached' });
+});
+
+test('a box is cropped and reconstructed again, with the options as they were', async (t) => {
+  const page = await openPage(t, browser, `${base}#/reconstructions/done`);
+  await until(async () => allShown(await meshNumbers(page)));
+  await page.getByRole('button', { name: 'Crop' }).click();
+  const least = page.getByLabel('Least x');
+  await until(async () => Number(await page.getByLabel('Least y').getAttribute('max')) > 15); // six rows of 4 units
+  const [from, to] = [Number(await least.getAttribute('min')), Number(await least.getAttribute('max'))];
+  await least.focus();
+  for (let i = 0; i < 10; ++i) await page.keyboard.press('ArrowRight');
+  await keepScreenshot(page, 'crop');
+  assert.deepEqual(await violations(page), []);
+  const [download] = await Promise.all([
+    page.waitForEvent('download'),
+    page.getByRole('button', { name: 'Download region.json' }).click(),
+  ]);
+  const region = JSON.parse(readFileSync(await download.path()));
+  assert.equal(region.length, 6);
+  assert.ok(Math.abs(region[0] - (from + (10 * (to - from)) / 200)) < 1e-3 * (to - from), `${region} of ${from} to ${to}`);
+
+  await page.getByRole('button', { name: 'Again, this box alone' }).click();
+  await page.getByText('which are not uploaded again').waitFor();
+  assert.deepEqual(await violations(page), []);
+  await page.getByLabel('Name', { exact: true }).fill('the-box');
+  await page.getByRole('button', { name: 'Submit', exact: true }).click();
+  await page.getByRole('heading', { name: 'the-box' }).waitFor();
+  const files = api.startedWith.get('the-box');
+  assert.deepEqual([...files.keys()], ['region.json']);
+  assert.deepEqual(JSON.parse(String(files.get('region.json').bytes)), region);
 });
 
 test('a running reconstruction can be cancelled, after a question', async (t) => {

@@ -123,6 +123,25 @@ test('from a dropped folder to the downloaded mesh', { timeout: 600_000 }, async
   assert.equal(download.suggestedFilename(), 'facade.ply');
 });
 
+test('a box of it is reconstructed again, from the photographs that are there', { timeout: 600_000 }, async (t) => {
+  const page = await openPage(t, browser, `${base}#/reconstructions/facade`);
+  await until(async () => (await meshNumbers(page)).complete, TIMEOUT);
+  await page.getByRole('button', { name: 'Crop' }).click();
+  await page.getByLabel('Least x').focus();
+  for (let i = 0; i < 120; ++i) await page.keyboard.press('ArrowRight');
+  await page.getByRole('button', { name: 'Again, this box alone' }).click();
+  await page.getByText('which are not uploaded again').waitFor();
+  await page.locator('.option').first().waitFor();
+  assert.equal(await page.locator('#option-min-component').inputValue(), '50', 'the options are those of before');
+  await page.getByLabel('Name', { exact: true }).fill('facade-box');
+  await page.getByRole('button', { name: 'Submit', exact: true }).click();
+  await page.getByRole('heading', { name: 'facade-box' }).waitFor(TIMEOUT);
+  await until(async () => (await stateOf(page)) === 'Done', TIMEOUT);
+  const facesOf = async (id) => Number((await (await fetch(`${base}v1/reconstructions/${id}`)).json()).progress.faces);
+  const [box, whole] = [await facesOf('facade-box'), await facesOf('facade')];
+  assert.ok(box > 0.2 * whole && box < 0.6 * whole, `${box} of ${whole} triangles`);
+});
+
 test('another one is cancelled from the page', { timeout: 300_000 }, async (t) => {
   const page = await openPage(t, browser, base);
   await submit(page, 'unwanted');

@@ -96,6 +96,12 @@ export const api = {
   },
   create: (request: { id: string; optionsJson: string; sceneReference: string; weight: number }) =>
     postJson<Reconstruction>('reconstructions', request),
+  // Another one of the same photographs; nothing of them is uploaded again.
+  createAgain: (from: string, request: { id: string; optionsJson: string; weight: number }) =>
+    postJson<Reconstruction>(`${at(from)}:again`, request),
+  reconstruction: (id: string) => getJson<Reconstruction>(at(id)),
+  // Of the coordinates that surfaces are sent in, to those of the scene.
+  offset: async (id: string) => (await getJson<{ offset?: number[] }>(`${at(id)}/parts`)).offset ?? [0, 0, 0],
   start: (id: string) => postJson<Reconstruction>(`${at(id)}:start`),
   cancel: (id: string) => postJson<Reconstruction>(`${at(id)}:cancel`),
   remove: async (id: string) => void (await call(at(id), { method: 'DELETE' })),

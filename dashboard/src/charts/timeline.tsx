@@ -20,8 +20,8 @@ const RANGES = [
 const ENDINGS: Record<AttemptEnding, [words: string, color: string]> = {
   UNSPECIFIED: ['under way', '--state-assigned'],
   FINISHED: ['finished', '--state-committed'],
-  FAILED: ['failed', '--state-set-aside'],
-  OUT_OF_MEMORY: ['out of memory', '--state-set-aside'],
+  FAILED: ['failed', '--state-skipped'],
+  OUT_OF_MEMORY: ['out of memory', '--state-skipped'],
   LOST: ['lease lost', '--state-lost'],
   RELEASED: ['released', '--state-waiting'],
 };

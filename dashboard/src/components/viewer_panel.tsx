@@ -11,7 +11,10 @@ import { cssColor, theme } from '../theme';
 import type { Coloring } from '../view3d/part_buffer';
 import { nextBudget } from '../view3d/level_of_detail';
 import { PartLoader } from '../view3d/part_loader';
+import type { PhotoPlace } from '../view3d/photo_place';
+import type { Region } from '../view3d/region';
 import type { SceneViewer } from '../view3d/scene_viewer';
+import { CropBox } from './crop_box';
 import { Notice, Segmented } from './pieces';
 
 const COLORINGS = [
@@ -38,6 +41,17 @@ interface ViewerNumbers {
   faces: number;
   shown: number;
   complete: boolean;
+  region: Region | null; // that the surface fills
+}
+
+interface LaidPhoto {
+  camera: number;
+  place: PhotoPlace;
+}
+
+interface Measured {
+  points: number;
+  distance: number | null;
 }
 
 // The 3D view on a canvas, fed from the store: null until three.js is there. `failure` says why there is none.
@@ -47,7 +61,15 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
   const [failure, setFailure] = useState('');
   const rest = useRef(() => {});
   const frameTook = useRef((_milliseconds: number) => {});
-  const [numbers, setNumbers] = useState<ViewerNumbers>({ parts: 0, faces: 0, shown: 0, complete: false });
+  const [photo, setPhoto] = useState<LaidPhoto | null>(null);
+  const [measured, setMeasured] = useState<Measured>({ points: 0, distance: null });
+  const [numbers, setNumbers] = useState<ViewerNumbers>({
+    parts: 0,
+    faces: 0,
+    shown: 0,
+    complete: false,
+    region: null,
+  });
 
   useEffect(() => {
     let closed = false;
@@ -61,6 +83,8 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
             onPick: onSelect,
             onRest: () => rest.current(),
             onFrame: (milliseconds) => frameTook.current(milliseconds),
+            onLookThrough: (camera, place) => setPhoto(place === null ? null : { camera, place }),
+            onMeasure: (points, distance) => setMeasured({ points, distance }),
           }),
         );
       } catch {
@@ -102,6 +126,7 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
         faces: loading.facesOfWhole,
         shown: made.shownFaces,
         complete: loading.complete,
+        region: made.surfaceRegion,
       });
     }, 250);
     return () => {
@@ -125,18 +150,34 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
   }, [viewer, loader]);
   useEffect(() => viewer?.setBackground(cssColor('--stage')), [viewer, theme.value]);
   useEffect(() => viewer?.select(selected), [viewer, selected, store.cameras.value]);
-  return { viewer, failure, numbers };
+  return { viewer, failure, numbers, photo, measured };
+}
+
+const inPixels = ({ left, top, width, height }: PhotoPlace) => ({
+  left: `${left}px`,
+  top: `${top}px`,
+  width: `${width}px`,
+  height: `${height}px`,
+});
+
+function measuredWords({ points, distance }: Measured): string {
+  if (distance !== null) return `${Number(distance.toPrecision(4))} units of the scene`;
+  return points === 0 ? 'Click a point of the surface' : 'Click another one';
 }
 
 export function ViewerPanel(props: Props) {
   const { store, selected } = props;
   const canvas = useRef<HTMLCanvasElement>(null);
   const frame = useRef<HTMLDivElement>(null);
-  const { viewer, failure, numbers } = useViewer(canvas, props);
+  const { viewer, failure, numbers, photo, measured } = useViewer(canvas, props);
   const [coloring, setColoring] = useState<Coloring>('photo');
   const [frusta, setFrusta] = useState(true);
+  const [measuring, setMeasuring] = useState(false);
+  const [cropping, setCropping] = useState(false);
+  const [opacity, setOpacity] = useState(60);
   useEffect(() => viewer?.setColoring(coloring), [viewer, coloring]);
   useEffect(() => viewer?.showFrusta(frusta), [viewer, frusta]);
+  useEffect(() => viewer?.setMeasuring(measuring), [viewer, measuring]);
 
   const onKeyDown = (event: KeyboardEvent) => {
     if (viewer === null || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -151,6 +192,7 @@ export function ViewerPanel(props: Props) {
       '-': () => viewer.orbit(0, 0, 1 / 0.85),
       f: () => viewer.fit(),
       c: () => setFrusta((shown) => !shown),
+      m: () => setMeasuring((on) => !on),
     };
     const move = moves[event.key];
     if (move === undefined) return;
@@ -172,9 +214,17 @@ export function ViewerPanel(props: Props) {
         ref={canvas}
         tabIndex={0}
         role="application"
-        aria-label={`The mesh in 3D: ${words}. Arrow keys turn, plus and minus zoom, F shows everything, C shows or hides cameras.`}
+        aria-label={`The mesh in 3D: ${words}. Arrow keys turn, plus and minus zoom, F shows everything, C shows or hides cameras, M measures.`}
         onKeyDown={onKeyDown}
       />
+      {photo !== null && (
+        <img
+          class="stage-photo"
+          style={{ ...inPixels(photo.place), opacity: opacity / 100 }}
+          src={reconstructionUrl(store.id, `/cameras/${photo.camera}/photo?width=1280`)}
+          alt=""
+        />
+      )}
       {failure !== '' && (
         <div class="stage-failure">
           <Notice tone="warning">{failure}</Notice>
@@ -198,9 +248,32 @@ export function ViewerPanel(props: Props) {
             class="button small"
             disabled={selected < 0}
             onClick={() => viewer?.lookThrough(selected)}
-            title="Look from where the selected camera stood"
+            title={
+              selected < 0
+                ? 'Select a camera first: in the list, or its pyramid here'
+                : 'Look from where the selected camera stood, its photograph laid over'
+            }
           >
             Look through
+          </button>
+          <button
+            class="button small"
+            aria-pressed={measuring}
+            onClick={() => setMeasuring(!measuring)}
+            title="Measure between two points of the surface (M)"
+          >
+            Measure
+          </button>
+          <button
+            class="button small"
+            aria-pressed={cropping}
+            disabled={numbers.parts === 0}
+            onClick={() => setCropping(!cropping)}
+            title={
+              numbers.parts === 0 ? 'There is no surface yet' : 'Choose a box, and reconstruct what is in it alone'
+            }
+          >
+            Crop
           </button>
           <button
             class="button small wide-only"
@@ -212,7 +285,27 @@ export function ViewerPanel(props: Props) {
           </button>
         </div>
       </div>
+      {cropping && viewer !== null && numbers.region !== null && (
+        <CropBox id={store.id} viewer={viewer} bounds={numbers.region} />
+      )}
       <div class="stage-bottom">
+        {photo !== null && (
+          <label class="stage-tool">
+            Photograph
+            <input
+              type="range"
+              min="0"
+              max="100"
+              value={opacity}
+              onInput={(event) => setOpacity(Number(event.currentTarget.value))}
+            />
+          </label>
+        )}
+        {measuring && (
+          <output class="stage-tool" data-distance={measured.distance ?? ''}>
+            {measuredWords(measured)}
+          </output>
+        )}
         <output
           class="stage-numbers"
           data-parts={numbers.parts}

@@ -9,6 +9,7 @@ import { CameraPanel } from '../components/camera_panel';
 import { Downloads } from '../components/downloads';
 import { useNow } from '../components/hooks';
 import { LogCard } from '../components/log';
+import { NotifyButton, useNotification } from '../components/notification';
 import { Confirm, Notice, PageTitle, ProgressBar, StateBadge } from '../components/pieces';
 import { SlowestStepWords } from '../components/slowest_step';
 import { ViewerPanel } from '../components/viewer_panel';
@@ -94,6 +95,7 @@ export default function ReconstructionPage({ id }: { id: string }) {
 
   const reconstruction = store?.reconstruction.value ?? null;
   const state = reconstruction === null ? null : stateOf(reconstruction);
+  useNotification(id, state);
   const cancelAnswered = async (yes: boolean) => {
     setCancelling(false);
     if (!yes || store === null) return;
@@ -137,6 +139,12 @@ export default function ReconstructionPage({ id }: { id: string }) {
             <button class="button danger" onClick={() => setCancelling(true)}>
               Cancel
             </button>
+          )}
+          {state !== null && !isOver(state) && <NotifyButton />}
+          {state !== null && state !== 'CREATED' && (
+            <a class="button" href={linkTo.again(id)} title="The same photographs with other options">
+              Again …
+            </a>
           )}
           {state !== null && isOver(state) && (
             <button class="button danger" onClick={() => setDeleting(true)}>

@@ -273,7 +273,35 @@ function NameAndShare({ id, onId, weight, onWeight }: NameAndShareProps) {
   );
 }
 
-export default function SubmitPage() {
+interface SubmitPageProps {
+  again?: string | undefined; // the photographs of this reconstruction, with other options
+  region?: number[] | undefined;
+}
+
+function AgainField({ again, region }: { again: string; region: number[] | undefined }) {
+  return (
+    <section class="card" aria-label="Scene">
+      <div class="body">
+        <Notice>
+          The photographs of <a href={linkTo.reconstruction(again)}>{again}</a>, which are not uploaded again.
+          {region !== undefined && (
+            <>
+              {' '}
+              Only what lies in the box from ({region.slice(0, 3).map(short).join(', ')}) to (
+              {region.slice(3).map(short).join(', ')}) is reconstructed.
+            </>
+          )}
+        </Notice>
+      </div>
+    </section>
+  );
+}
+
+const jsonBlob = (value: unknown) => new Blob([JSON.stringify(value)], { type: 'application/json' });
+
+const short = (value: number) => Number(value.toPrecision(7));
+
+export default function SubmitPage({ again, region }: SubmitPageProps) {
   const [files, setFiles] = useState<FileToSend[]>([]);
   const [reference, setReference] = useState('');
   const [id, setId] = useState('');
@@ -287,8 +315,20 @@ export default function SubmitPage() {
   const uploader = useRef<Uploader | null>(null);
   useEffect(() => {
     api.options().then(setOptions, (error: Error) => setFailure(`Options cannot be shown: ${error.message}`));
+    if (again !== undefined) void takeOver(again);
     return () => uploader.current?.stop();
   }, []);
+  const takeOver = async (from: string) => {
+    setId(`${from}-again`.slice(0, 64));
+    try {
+      const { optionsJson, weight: share } = await api.reconstruction(from);
+      const before = JSON.parse(optionsJson || '{}') as Record<string, unknown>;
+      setValues(Object.fromEntries(Object.entries(before).map(([name, value]) => [name, String(value)])));
+      setWeight(String(share ?? 1));
+    } catch (error) {
+      setFailure((error as Error).message);
+    }
+  };
   // Leaving the page would end the upload.
   useEffect(() => {
     if (!busy) return;
@@ -305,17 +345,18 @@ export default function SubmitPage() {
   const send = async () => {
     const chosen = Object.entries(values).filter(([, value]) => value !== '');
     const optionsJson = JSON.stringify(Object.fromEntries(chosen.map(([name, value]) => [name, Number(value)])));
-    await api.create({
-      id,
-      optionsJson,
-      sceneReference: files.length > 0 ? '' : reference.trim(),
-      weight: Number(weight),
-    });
-    if (files.length > 0) {
+    if (again !== undefined) {
+      await api.createAgain(again, { id, optionsJson, weight: Number(weight) });
+    } else {
+      const sceneReference = files.length > 0 ? '' : reference.trim();
+      await api.create({ id, optionsJson, sceneReference, weight: Number(weight) });
+    }
+    const sent = region === undefined ? files : [...files, { path: 'region.json', blob: jsonBlob(region) }];
+    if (sent.length > 0) {
       const digester = new Digester();
       startMs.current = Date.now();
       uploader.current = new Uploader({
-        files,
+        files: sent,
         listFiles: () => api.files(id),
         sendPart: sendPartTo(id),
         digest: digester.digest,
@@ -343,7 +384,7 @@ export default function SubmitPage() {
     setBusy(false);
   };
 
-  const ready = VALID_ID.test(id) && (files.length > 0 || reference.trim() !== '') && !busy;
+  const ready = VALID_ID.test(id) && (again !== undefined || files.length > 0 || reference.trim() !== '') && !busy;
   return (
     <>
       <div class="page-head">
@@ -351,7 +392,17 @@ export default function SubmitPage() {
       </div>
       <form class="submit" onSubmit={(event) => void submit(event)}>
         <div class="submit-main">
-          <SceneField files={files} onFiles={takeFiles} reference={reference} onReference={setReference} busy={busy} />
+          {again !== undefined ? (
+            <AgainField again={again} region={region} />
+          ) : (
+            <SceneField
+              files={files}
+              onFiles={takeFiles}
+              reference={reference}
+              onReference={setReference}
+              busy={busy}
+            />
+          )}
           <NameAndShare id={id} onId={setId} weight={weight} onWeight={setWeight} />
           {failure !== '' && <Notice tone="danger">{failure}</Notice>}
           {busy && progress !== null && <UploadStatus progress={progress} startMs={startMs.current} />}

@@ -57,7 +57,8 @@ function WorkerCard(props: { worker: Worker; now: number; onDrain: () => void })
           {running.map((one) => (
             <li key={`${one.reconstructionId}/${one.sequence}`}>
               <span>
-                {one.camera < 0 ? 'cameras' : `camera ${one.camera}`} of <a href={linkTo.reconstruction(one.reconstructionId)}>{one.reconstructionId}</a>
+                {one.camera < 0 ? 'cameras' : `camera ${one.camera}`} of{' '}
+                <a href={linkTo.reconstruction(one.reconstructionId)}>{one.reconstructionId}</a>
               </span>
               <span class="muted">{duration(Math.max(0, (now - Date.parse(one.beginTime)) / 1000))}</span>
             </li>

@@ -3,24 +3,31 @@
 import {
   AmbientLight,
   Box3,
+  Box3Helper,
   Color,
   ColorManagement,
   DirectionalLight,
   LinearSRGBColorSpace,
   PerspectiveCamera,
   Quaternion,
+  Raycaster,
   Scene,
+  Sphere,
   Spherical,
+  Vector2,
   Vector3,
   WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import { POSE, type CameraTable } from '../api/camera_table';
+import { FRUSTUM, POSE, type CameraTable } from '../api/camera_table';
 import { CameraFrusta } from './camera_frusta';
 import { commonUp } from './common_up';
+import { Measure } from './measure';
 import { PartBuffer, type Coloring } from './part_buffer';
 import type { LoadedPart } from './part_loader';
+import { placePhoto, type PhotoPlace } from './photo_place';
 import type { PartGeometry } from './preview_decoder';
+import type { Region } from './region';
 
 export interface SceneViewerCallbacks {
   onPick: (camera: number) => void;
@@ -28,11 +35,17 @@ export interface SceneViewerCallbacks {
   onRest: () => void;
   // So long the graphics card took for the last frame.
   onFrame: (milliseconds: number) => void;
+  // The view stands where a camera stood, whose photograph lies there on the canvas; null: it does no more.
+  onLookThrough: (camera: number, place: PhotoPlace | null) => void;
+  // A point was measured; null until there are two.
+  onMeasure: (points: number, distance: number | null) => void;
 }
 
 // Photographs' colours go to the screen as they are.
 ColorManagement.enabled = false;
 
+const FIELD_OF_VIEW = 45; // degrees
+const REGION_COLOR = 0xff4fd8;
 const REST_MS = 250;
 // Frames that only show that more has come need not be many; software rendering leaves little time for anything else.
 const MS_BETWEEN_GROWTH_FRAMES = 150;
@@ -45,11 +58,13 @@ export class SceneViewer {
   readonly inSoftware: boolean;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly view = new PerspectiveCamera(45, 1, 0.01, 1000);
+  private readonly view = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 1000);
   private controls: OrbitControls;
   private readonly parts = new PartBuffer();
   private readonly frusta = new CameraFrusta();
   private readonly light = new DirectionalLight(0xffffff, 1.9);
+  private readonly measure = new Measure();
+  private readonly region = new Box3Helper(new Box3(), REGION_COLOR);
   private readonly resizing: ResizeObserver;
   private readonly up = new Vector3(0, 0, 1);
   private readonly cameraBox = new Box3();
@@ -64,6 +79,8 @@ export class SceneViewer {
   private restTimer: ReturnType<typeof setTimeout> | undefined;
   private growthTimer: ReturnType<typeof setTimeout> | undefined;
   private movedByHand = false;
+  private measuring = false;
+  private lookingThrough = -1; // the camera
   private fittedRadius = 0;
   private fittedSurface = false;
   private pressed: { x: number; y: number } | null = null;
@@ -82,7 +99,9 @@ export class SceneViewer {
     // Asking how a shader was compiled makes the page wait until it is.
     this.renderer.debug.checkShaderErrors = import.meta.env.DEV;
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
-    this.scene.add(this.parts.mesh, this.frusta.lines, new AmbientLight(0xffffff, 1.1), this.light);
+    this.region.visible = false;
+    this.scene.add(this.parts.mesh, this.frusta.lines, this.measure.object, this.region);
+    this.scene.add(new AmbientLight(0xffffff, 1.1), this.light);
     this.view.up.copy(this.up);
     this.controls = this.makeControls();
     canvas.addEventListener('pointerdown', this.press);
@@ -138,7 +157,7 @@ export class SceneViewer {
     this.draw();
   }
 
-  // Stands behind the camera and looks where it looks, held as it was held.
+  // Stands where the camera stood and looks where it looked, held as it was held.
   lookThrough(camera: number) {
     if (this.table === null || camera < 0) return;
     const pose = this.table.poses.subarray(POSE * camera, POSE * (camera + 1));
@@ -146,17 +165,44 @@ export class SceneViewer {
     const center = this.frusta.centerOf(camera);
     const distance = Math.max(this.boxToFit().getCenter(new Vector3()).sub(center).dot(forward), this.radius() * 0.2);
     this.turnUp(new Vector3(-pose[1]!, -pose[4]!, -pose[7]!));
-    this.view.position.copy(center).addScaledVector(forward, -0.05 * distance);
+    this.view.position.copy(center);
     this.controls.target.copy(center).addScaledVector(forward, distance);
     this.movedByHand = true;
     this.controls.update();
+    this.lookingThrough = camera;
+    this.placePhoto();
     this.changed();
+  }
+
+  // While it is on, a click on the surface is a point to measure from, or to.
+  setMeasuring(on: boolean) {
+    this.measuring = on;
+    this.measure.clear();
+    this.callbacks.onMeasure(0, null);
+    this.draw();
+  }
+
+  // What the surface fills; null while there is none.
+  get surfaceRegion(): Region | null {
+    const { min, max } = this.partBox;
+    return this.partBox.isEmpty() ? null : [min.x, min.y, min.z, max.x, max.y, max.z];
+  }
+
+  showRegion(region: Region | null) {
+    this.region.visible = region !== null;
+    if (region !== null) {
+      this.region.box.min.fromArray(region);
+      this.region.box.max.fromArray(region, 3);
+    }
+    this.draw();
   }
 
   // The surface in view, upright, from where the cameras stand; the cameras where there is none yet.
   fit() {
     const box = this.boxToFit();
     if (box.isEmpty()) return;
+    this.leaveCamera();
+    this.setFieldOfView(FIELD_OF_VIEW);
     this.turnUp(this.up);
     const center = box.getCenter(new Vector3());
     const radius = this.radiusToFit();
@@ -176,6 +222,7 @@ export class SceneViewer {
 
   // Angles in radians; `zoom` multiplies the distance.
   orbit(azimuth: number, polar: number, zoom: number) {
+    this.leaveCamera();
     const offset = this.view.position.clone().sub(this.controls.target);
     const toY = new Vector3(0, 1, 0);
     const turned = offset.clone().applyQuaternion(quaternionBetween(this.view.up, toY));
@@ -212,6 +259,8 @@ export class SceneViewer {
     this.controls.dispose();
     this.parts.dispose();
     this.frusta.dispose();
+    this.measure.dispose();
+    this.region.dispose();
     this.renderer.dispose();
   }
 
@@ -221,14 +270,49 @@ export class SceneViewer {
     const { pressed } = this;
     this.pressed = null;
     if (pressed === null || Math.hypot(event.offsetX - pressed.x, event.offsetY - pressed.y) > 4) return;
+    if (this.measuring) return this.measureAt(event.offsetX, event.offsetY);
     if (!this.frusta.lines.visible) return;
     const { clientWidth, clientHeight } = this.canvas;
     const camera = this.frusta.pick(event.offsetX, event.offsetY, clientWidth, clientHeight, this.view);
     if (camera >= 0) this.callbacks.onPick(camera);
   };
 
+  private measureAt(x: number, y: number) {
+    const { clientWidth, clientHeight } = this.canvas;
+    const ray = new Raycaster();
+    ray.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.view);
+    const { geometry } = this.parts.mesh;
+    geometry.boundingSphere = this.partBox.getBoundingSphere(new Sphere());
+    const hit = ray.intersectObject(this.parts.mesh)[0];
+    if (hit === undefined) return;
+    this.measure.add(hit.point);
+    this.callbacks.onMeasure(this.measure.count, this.measure.distance);
+    this.draw();
+  }
+
+  private placePhoto() {
+    if (this.table === null || this.lookingThrough < 0) return;
+    const frustum = this.table.frusta.subarray(FRUSTUM * this.lookingThrough, FRUSTUM * (this.lookingThrough + 1));
+    const place = placePhoto(frustum, this.canvas.clientWidth, this.canvas.clientHeight);
+    this.setFieldOfView(place.fieldOfView);
+    this.callbacks.onLookThrough(this.lookingThrough, place);
+  }
+
+  private leaveCamera() {
+    if (this.lookingThrough < 0) return;
+    this.callbacks.onLookThrough(this.lookingThrough, null);
+    this.lookingThrough = -1;
+  }
+
+  private setFieldOfView(degrees: number) {
+    this.view.fov = degrees;
+    this.view.updateProjectionMatrix();
+  }
+
   private makeControls(): OrbitControls {
     const controls = new OrbitControls(this.view, this.canvas);
+    // A click alone does not move.
+    controls.addEventListener('change', () => this.pressed !== null && this.leaveCamera());
     controls.addEventListener('start', () => (this.movedByHand = true));
     controls.addEventListener('change', () => this.changed());
     return controls;
@@ -362,6 +446,7 @@ export class SceneViewer {
     this.renderer.setSize(width, height, false);
     this.view.aspect = width / height;
     this.view.updateProjectionMatrix();
+    this.placePhoto();
     this.draw();
   }
 }

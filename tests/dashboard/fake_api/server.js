@@ -67,6 +67,7 @@ export class FakeApi {
     );
     this.uploads = new Map(); // id -> path -> {size, sha256, bytes}
     this.created = new Map();
+    this.startedWith = new Map(); // id -> path -> file
     this.optionsOf = new Map(); // id -> what it was created with
     this.requests = 0;
     this.failNext = 0; // so many of the next parts of files are refused
@@ -121,6 +122,7 @@ export class FakeApi {
     }
     if (path === '/v1/reconstructions') return this.all(request, response);
     const [id, action] = route[1].split(':');
+    if (action === 'again') return this.all(request, response);
     if (this.created.has(id)) return this.beingMade(request, response, url, id, action ?? '', route.slice(2));
     const simulation = this.simulations.get(id);
     if (simulation === undefined) return problem(response, 404, `id: "${id}": no such reconstruction`);
@@ -165,6 +167,7 @@ export class FakeApi {
       complete: file.bytes.length === file.size,
     });
     if (action === 'start') {
+      this.startedWith.set(id, new Map(files));
       this.created.delete(id);
       const workers = this.workers.slice(0, 2).map((worker) => worker.id);
       const simulation = new Simulation({
