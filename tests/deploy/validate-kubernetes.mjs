@@ -56,7 +56,7 @@ function onlyKnown(object, what, value) {
 const named = (kind) => new Set(objects.filter((o) => o.kind === kind).map((o) => o.metadata.name));
 const secretsOfTheUser = new Set(["meshwright-postgres", "meshwright-s3", "meshwright-tls", "meshwright-tokens"]);
 const templateOf = (object) => (object.kind === "CronJob" ? object.spec.jobTemplate.spec.template : object.spec.template);
-const podLabels = objects.filter((o) => ["CronJob", "Deployment"].includes(o.kind)).map((o) => templateOf(o).metadata.labels);
+const podLabels = objects.filter((o) => ["CronJob", "Deployment", "Job"].includes(o.kind)).map((o) => templateOf(o).metadata.labels);
 const selects = (selector) =>
   podLabels.some((labels) => Object.entries(selector ?? {}).every(([key, value]) => labels[key] === value));
 
@@ -76,7 +76,7 @@ function checkContainer(object, container) {
   if (security.allowPrivilegeEscalation !== false) complain(object, "it may get more rights");
   if (!security.capabilities?.drop?.includes("ALL")) complain(object, "it keeps capabilities");
   if (!container.resources?.requests?.memory || !container.resources?.limits?.memory) complain(object, "no memory said");
-  if (object.kind === "Deployment") checkProbes(object, container);
+  if (["Deployment", "Job"].includes(object.kind)) checkProbes(object, container);
   for (const entry of container.env ?? []) {
     onlyKnown(object, "env", entry);
     const secret = entry.valueFrom?.secretKeyRef;
@@ -108,20 +108,38 @@ function checkPod(object, pod) {
   }
 }
 
-function checkDeployment(object) {
-  const pod = object.spec.template.spec;
-  onlyKnown(object, "deployment", object.spec);
-  checkPod(object, pod);
-  if (!selects(object.spec.selector.matchLabels)) complain(object, "its selector selects nothing");
+function checkDrain(object, pod) {
   const env = pod.containers.flatMap((container) => container.env ?? []);
   const drain = env.find((entry) => entry.name === "MESHWRIGHT_DRAIN_SECONDS");
   if (drain && pod.terminationGracePeriodSeconds < Number(drain.value) + 15) {
     complain(object, "it is killed before it is drained");
   }
+}
+
+function checkDeployment(object) {
+  const pod = object.spec.template.spec;
+  onlyKnown(object, "deployment", object.spec);
+  checkPod(object, pod);
+  if (!selects(object.spec.selector.matchLabels)) complain(object, "its selector selects nothing");
+  checkDrain(object, pod);
   if (!objects.some((o) => o.kind === "PodDisruptionBudget" &&
       Object.entries(o.spec.selector.matchLabels).every(([k, v]) => object.spec.template.metadata.labels[k] === v))) {
     complain(object, "no disruption budget");
   }
+}
+
+// Workers that end by themselves and are begun anew wherever they died.
+function checkJob(object) {
+  checkPod(object, templateOf(object).spec);
+  const { spec } = object;
+  if (spec.completionMode !== "Indexed") complain(object, "two of its pods would do the same part");
+  if (spec.completions < spec.parallelism) complain(object, "more pods than parts");
+  if (!(spec.backoffLimit >= 100)) complain(object, "a few lost nodes end it");
+  const env = templateOf(object).spec.containers.flatMap((container) => container.env ?? []);
+  if (!env.some((entry) => entry.name === "MESHWRIGHT_EXIT_WHEN_IDLE" && Number(entry.value) > 0)) {
+    complain(object, "its workers never end");
+  }
+  checkDrain(object, templateOf(object).spec);
 }
 
 function checkIngress(object) {
@@ -156,6 +174,7 @@ for (const object of objects) {
   validateSchema(object);
   if (object.kind !== "Namespace" && object.metadata?.namespace !== "meshwright") complain(object, "another namespace");
   if (object.kind === "Deployment") checkDeployment(object);
+  if (object.kind === "Job") checkJob(object);
   if (object.kind === "CronJob") checkPod(object, templateOf(object).spec);
   if (object.kind === "Ingress") checkIngress(object);
   if (object.kind === "ScaledObject") checkScaling(object);
@@ -167,9 +186,10 @@ for (const object of objects) {
     complain(object, "its selector selects nothing");
   }
 }
-for (const kind of ["Deployment", "Service", "PodDisruptionBudget", "NetworkPolicy", "ScaledObject"]) {
+for (const kind of ["Deployment", "Service", "PodDisruptionBudget", "NetworkPolicy"]) {
   if (named(kind).size === 0) errors.push(`no ${kind}`);
 }
+if (named("ScaledObject").size + named("Job").size !== 1) errors.push("workers are neither scaled nor a job, or both");
 if (errors.length > 0) {
   console.error(errors.map((error) => `${name}: ${error}`).join("\n"));
   process.exit(1);

@@ -78,6 +78,7 @@ Agent::Agent(const AgentOptions& options, WorkerChannel& channel, BlobStore& blo
       clock_(clock),
       contexts_(blobs_, std::move(parse), options.memory_bytes / kCacheShare),
       pool_(options.cores),
+      held_last_(clock.Uptime()),
       backoff_(kBlobBackoff) {}
 
 Agent::~Agent() {
@@ -121,7 +122,11 @@ v1::SynchronizeRequest Agent::NextRequest() {
   }
   request.set_cores(std::max(1, options_.cores - lost_cores));
   request.set_draining(draining_ || now < backoff_until_ || lost_cores >= options_.cores);
-  request.set_wait_timeout_seconds(request.draining() ? kDrainingWaitTimeoutSeconds : kWaitTimeoutSeconds);
+  const absl::Duration until_idle_exit =
+      held_.empty() ? held_last_ + options_.exit_when_idle - now : absl::InfiniteDuration();
+  request.set_wait_timeout_seconds(request.draining()
+                                       ? kDrainingWaitTimeoutSeconds
+                                       : std::clamp(absl::ToDoubleSeconds(until_idle_exit), 0.0, kWaitTimeoutSeconds));
   return request;
 }
 
@@ -250,6 +255,13 @@ v1::HeldJob Agent::Process(const v1::CameraJob& job) {
   return told;
 }
 
+absl::Duration Agent::IdleFor() {
+  const MutexLock lock(mutex_);
+  const absl::Duration now = clock_.Uptime();
+  if (!held_.empty()) held_last_ = now;
+  return now - held_last_;
+}
+
 bool Agent::Finished() {
   const MutexLock lock(mutex_);
   return draining_ && std::all_of(held_.begin(), held_.end(), [](const auto& entry) { return entry.second.dropped; });
@@ -258,6 +270,7 @@ bool Agent::Finished() {
 void Agent::Run() {
   Backoff retry(kRetry);
   while (true) {
+    if (IdleFor() >= options_.exit_when_idle) Drain();
     const bool last = Finished();
     const absl::StatusOr<v1::SynchronizeResponse> response = channel_.Synchronize(NextRequest());
     if (response.ok()) {

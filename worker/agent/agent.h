@@ -33,6 +33,8 @@ struct AgentOptions {
   int cores = 1;                             // jobs at the same time, and cores of all of them together
   int64_t memory_bytes = 1 << 30;            // what jobs may take together
   absl::Duration drain = absl::Seconds(30);  // after Drain(), jobs may take so long before they are released
+  // A worker that held nothing for so long drains by itself.
+  absl::Duration exit_when_idle = absl::InfiniteDuration();
   // The process of this worker before this one was killed since memory ran out.
   bool ran_out_of_memory = false;
   std::string work_folder;    // for estimating cameras
@@ -52,7 +54,7 @@ class Agent {
   // Waits for jobs that still run.
   ~Agent();
 
-  // Works until Drain() and what follows from it.
+  // Works until Drain(), or AgentOptions::exit_when_idle, and what follows from it.
   void Run();
   // From another thread: takes no new jobs; Run() returns once all that run are finished or released.
   void Drain();
@@ -72,6 +74,7 @@ class Agent {
   v1::HeldJob ProcessPhotographs(const Key& key, const v1::CameraJob& job);
   v1::SynchronizeRequest NextRequest();
   void Follow(const v1::SynchronizeResponse& response);
+  absl::Duration IdleFor();
   bool Finished();
 
   const AgentOptions options_;
@@ -87,6 +90,7 @@ class Agent {
   Mutex mutex_;
   ConditionVariable wake_;
   std::map<Key, Held> held_ ABSL_GUARDED_BY(mutex_);
+  absl::Duration held_last_ ABSL_GUARDED_BY(mutex_);  // something was held, or the worker began
   bool draining_ ABSL_GUARDED_BY(mutex_) = false;
   absl::Duration drain_until_ ABSL_GUARDED_BY(mutex_) = absl::InfiniteDuration();
   // A worker that cannot reach the blobs leaves the jobs to others for a while.

@@ -113,13 +113,14 @@ class AgentTest : public testing::Test {
     std::filesystem::remove_all(folder_);
   }
 
-  void Start(AgentJob job, absl::Duration drain = absl::Seconds(30)) {
+  void Start(AgentJob job, absl::Duration drain = absl::Seconds(30),
+             absl::Duration exit_when_idle = absl::InfiniteDuration()) {
     const auto parse = [](const std::string& options_json) -> absl::StatusOr<JobConfig> {
       if (!options_json.empty()) return absl::InvalidArgumentError("no such option");
       return JobConfig{};
     };
-    agent_ = std::make_unique<Agent>(AgentOptions{.worker_id = "w", .cores = 2, .drain = drain}, coordinator_, *blobs_,
-                                     parse, std::move(job), Logger::Nowhere(), clock_);
+    const AgentOptions options = {.worker_id = "w", .cores = 2, .drain = drain, .exit_when_idle = exit_when_idle};
+    agent_ = std::make_unique<Agent>(options, coordinator_, *blobs_, parse, std::move(job), Logger::Nowhere(), clock_);
     thread_ = std::thread([this] { agent_->Run(); });
   }
   void Stop() {
@@ -299,6 +300,20 @@ TEST_F(HeldUpAgentTest, AJobThatSomebodyElseHasCostsItsCoreUntilItEndsAndIsNotTo
     EXPECT_EQ(said.held_size(), 0);
   }
   EXPECT_EQ(said.cores(), 2);
+}
+
+TEST_F(AgentTest, AWorkerThatHoldsNothingForLongEnoughDrainsAndEnds) {
+  Start(Nothing, absl::Seconds(30), absl::Seconds(100));
+  EXPECT_FALSE(coordinator_.WaitFor([](const auto&) { return true; }).draining());
+  clock_.Advance(absl::Seconds(99));
+  coordinator_.Want({Job(1)});  // in time: the wait begins anew
+  EXPECT_EQ(WaitForOutcome(v1::HeldJob::kFinished).key().sequence(), 1);
+  clock_.Advance(absl::Seconds(99));
+  coordinator_.Want({});
+  EXPECT_FALSE(coordinator_.WaitFor([](const auto& said) { return said.held_size() == 0; }).draining());
+  clock_.Advance(absl::Seconds(100));
+  coordinator_.Want({});
+  thread_.join();
 }
 
 TEST_F(HeldUpAgentTest, DrainingFinishesWhatRunsAndTakesNothingNew) {

@@ -27,6 +27,10 @@ void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {
                                     "after SIGTERM, jobs may take so long before they are released")
                         ->check(CLI::Range(0.0, 86400.0))
                         ->capture_default_str());
+  NameInEnvironment(program
+                        .add_option("--exit-when-idle", settings.exit_when_idle_seconds,
+                                    "seconds without a job after which the worker ends [it waits for more]")
+                        ->check(CLI::Range(1.0, 86400.0)));
   AddMetricsOption(program, settings.metrics_listen);
 }
 

@@ -80,6 +80,8 @@ class RealWorkerProgram final : public WorkerProgram {
              .cores = settings.cores,
              .memory_bytes = MemoryMib(settings) << 20,
              .drain = absl::Seconds(settings.drain_seconds),
+             .exit_when_idle = settings.exit_when_idle_seconds > 0 ? absl::Seconds(settings.exit_when_idle_seconds)
+                                                                   : absl::InfiniteDuration(),
              .ran_out_of_memory = settings.ran_out_of_memory,
              .work_folder = WorkFolder(),
              .estimator = FindEstimator(log_)},

@@ -16,8 +16,9 @@ struct WorkerSettings {
   int cores = 1;
   int64_t memory_mib = 0;  // 0: 512 for each core, at least 1024
   double drain_seconds = 30;
-  bool ran_out_of_memory = false;  // the process of this worker before this one was killed since memory ran out
-  std::string metrics_listen;      // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
+  double exit_when_idle_seconds = 0;  // a worker that held nothing for so long ends; 0: it waits for more
+  bool ran_out_of_memory = false;     // the process of this worker before this one was killed since memory ran out
+  std::string metrics_listen;         // host:port for /metrics, /healthz and /readyz; port 0 takes a free one; "": none
 };
 
 // Host name and process.
@@ -31,7 +32,7 @@ class WorkerProgram {
   static absl::Status Check(const WorkerSettings& settings);
   static absl::StatusOr<std::unique_ptr<WorkerProgram>> Make(const WorkerSettings& settings);
   virtual ~WorkerProgram() = default;
-  // Until Drain() and what follows from it.
+  // Until Drain(), or exit_when_idle_seconds, and what follows from it.
   virtual void Run() = 0;
   virtual void Drain() = 0;
   virtual int metrics_port() const = 0;  // 0: none
