@@ -35,9 +35,11 @@ absl::Status WrongState(const Reconstruction& stored, const char* expected) {
       absl::StrCat("reconstruction ", stored.id, " is ", InWords(ToProto(stored.state)), ", expected ", expected));
 }
 
-v1::CameraState CameraStateOf(CameraJobState state, bool committed) {
+v1::CameraState CameraStateOf(CameraJobState state, bool committed, bool is_over) {
   if (state == CameraJobState::kSkipped) return v1::CAMERA_STATE_SKIPPED;
   if (committed) return v1::CAMERA_STATE_COMMITTED;
+  // Nobody is at what was cancelled, or has failed, and nobody will be.
+  if (is_over) return v1::CAMERA_STATE_WAITING;
   return state == CameraJobState::kDone ? v1::CAMERA_STATE_DONE : v1::CAMERA_STATE_ASSIGNED;
 }
 
@@ -414,6 +416,7 @@ absl::StatusOr<v1::ListCamerasResponse> ReconstructionService::ListCameras(const
   if (absl::IsFailedPrecondition(loaded.status())) return response;
   MW_RETURN_IF_ERROR(loaded.status());
   const Scene& scene = *loaded;
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, Find(id));
   for (size_t i = 0; i < scene.views.size(); ++i) {
     v1::Camera& camera = *response.add_cameras();
     camera.set_index(static_cast<int32_t>(i));
@@ -426,7 +429,7 @@ absl::StatusOr<v1::ListCamerasResponse> ReconstructionService::ListCameras(const
     if (job.camera < 0 || job.camera >= response.cameras_size()) continue;
     v1::Camera& camera = *response.mutable_cameras(job.camera);
     const bool committed = static_cast<size_t>(job.sequence) <= commits.size();
-    camera.set_state(CameraStateOf(job.state, committed));
+    camera.set_state(CameraStateOf(job.state, committed, IsFinal(stored.state)));
     camera.set_sequence(job.sequence);
     camera.set_skip_reason(WithoutServerPaths(job.skip_reason));
     camera.set_report_json(job.report_json);

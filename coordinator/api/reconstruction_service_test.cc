@@ -310,6 +310,20 @@ TEST_F(ReconstructionServiceTest, WhatWasBegunWithAnotherMethodWaitsForACoordina
   EXPECT_EQ(done.progress().cameras_skipped(), 0);
 }
 
+TEST_F(ReconstructionServiceTest, NobodyIsAtACameraOfWhatWasCancelled) {
+  CreateAndStart("wall");
+  RunWorker("w", 2, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
+  ASSERT_TRUE(service_->Cancel("wall").ok());
+  int committed = 0;
+  for (const v1::Camera& camera : service_->ListCameras("wall")->cameras()) {
+    EXPECT_TRUE(camera.state() == v1::CAMERA_STATE_COMMITTED || camera.state() == v1::CAMERA_STATE_WAITING)
+        << camera.name() << ": " << v1::CameraState_Name(camera.state());
+    committed += camera.state() == v1::CAMERA_STATE_COMMITTED ? 1 : 0;
+  }
+  EXPECT_EQ(committed, service_->Get("wall")->progress().cameras_committed());
+  EXPECT_LT(committed, kCameras);
+}
+
 // The store's clock was set back an hour, and the coordinator that held the lease is gone.
 TEST_F(ReconstructionServiceTest, AnotherTakesOverWhateverTheClockSays) {
   v1::CreateReconstructionRequest request;

@@ -6,11 +6,12 @@ import { PageTitle } from './components/pieces';
 import { ReconstructionsPage } from './pages/reconstructions';
 import { linkTo, route } from './router';
 import { chooseTheme, theme } from './theme';
+import { untilLoaded } from './until_loaded';
 
 // three.js and the charts come with the page that needs them.
-const ReconstructionPage = lazy(() => import('./pages/reconstruction'));
-const WorkersPage = lazy(() => import('./pages/workers'));
-const SubmitPage = lazy(() => import('./pages/submit'));
+const ReconstructionPage = lazy(() => untilLoaded(() => import('./pages/reconstruction')));
+const WorkersPage = lazy(() => untilLoaded(() => import('./pages/workers')));
+const SubmitPage = lazy(() => untilLoaded(() => import('./pages/submit')));
 
 function Logo() {
   return (

@@ -83,6 +83,21 @@ test('the mesh grows while one looks at it', async (t) => {
   await until(async () => Number((await page.locator('.summary dd').first().textContent()).split(' ')[0]) > seen);
 });
 
+test('a page whose code cannot be loaded is there once the coordinator is', async (t) => {
+  const page = await openPage(t, browser, base);
+  await page.getByRole('link', { name: 'done', exact: true }).waitFor();
+  let refused = 0;
+  const refuse = (route) => {
+    refused += 1;
+    return route.abort('connectionrefused');
+  };
+  await page.route(/assets\/workers-/, refuse);
+  await page.getByRole('link', { name: 'Workers' }).click();
+  await until(() => refused > 0);
+  await page.unroute(/assets\/workers-/, refuse);
+  await page.locator('.worker').first().waitFor();
+});
+
 test('colours switch between photographs, cameras and shape', async (t) => {
   const page = await openPage(t, browser, `${base}#/reconstructions/done`);
   await until(async () => allShown(await meshNumbers(page)));

@@ -233,6 +233,7 @@ function CameraDetails({ store, table, selected, onSelect }: Props & { table: Ca
           </div>
         ))}
       </dl>
+      <p class="muted small">Percentages are of the rays through the photograph’s lattice.</p>
       {camera?.index === selected && camera.seconds && <Stages seconds={camera.seconds} />}
       {neighbours.length > 0 && (
         <>

@@ -8,6 +8,7 @@ import { CAMERA_STATES, isOver, stateOf } from '../api/types';
 import { count } from '../format';
 import type { ReconstructionStore } from '../state/reconstruction_store';
 import { cssColor, theme } from '../theme';
+import { untilLoaded } from '../until_loaded';
 import type { Coloring } from '../view3d/part_buffer';
 import { nextBudget } from '../view3d/level_of_detail';
 import { PartLoader } from '../view3d/part_loader';
@@ -75,7 +76,7 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
     let closed = false;
     let close = () => {};
     // three.js is large; the rest of the page does not wait for it.
-    void import('../view3d/scene_viewer').then(({ SceneViewer }) => {
+    void untilLoaded(() => import('../view3d/scene_viewer')).then(({ SceneViewer }) => {
       if (closed) return;
       try {
         close = open(
