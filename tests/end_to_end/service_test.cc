@@ -2,6 +2,7 @@
 // that one process makes. What may go wrong meanwhile is in tests/faults.
 
 #include <csignal>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,24 @@ TEST(ServiceTest, SameBytesAsOneProcess) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
   const int coordinator_status = coordinator->Stop(SIGTERM);
   EXPECT_TRUE(WIFEXITED(coordinator_status) && WEXITSTATUS(coordinator_status) == 0);
+}
+
+// images/ that is a link to a folder elsewhere, as people keep photographs on another disk.
+TEST(ServiceTest, ALinkedFolderOfPhotographsIsRead) {
+  namespace fs = std::filesystem;
+  RunningService service;
+  const fs::path scene = service.folder() / "scene";
+  fs::create_directories(scene);
+  fs::copy(SharedScene("small") + "/model", scene / "model");
+  fs::copy(SharedScene("small") + "/images", service.folder() / "pictures");
+  fs::create_directory_symlink("../pictures", scene / "images");
+  const std::string expected = service.LocalMesh(SharedScene("small"), kQuickOptions);
+  EXPECT_TRUE(service.LocalMesh(scene, kQuickOptions) == expected);
+  const auto coordinator = service.StartCoordinator();
+  const auto worker = service.StartWorker("w");
+  const RunResult submitted = service.Client(With({"submit", scene, "--id", "linked"}, kQuickOptions));
+  ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
+  EXPECT_TRUE(service.WaitForMesh("linked") == expected);
 }
 
 TEST(ServiceTest, TheSurfacesSoFarCanBeFetched) {
