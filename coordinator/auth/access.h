@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <absl/status/status.h>
 
@@ -22,6 +23,8 @@ struct Caller {
   Role role = Role::kOperator;
   std::string only;     // a share link: the one reconstruction that it is for; "": all of the user's
   std::string address;  // where the call comes from
+  // That the certificate of the connection vouches for; none: it is not known by one.
+  std::vector<std::string> certified_names = {};
 };
 
 // What calls do.

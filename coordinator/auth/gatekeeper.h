@@ -81,6 +81,8 @@ class Gatekeeper {
   // Whether the caller may do this. PermissionDenied by role; NotFound for reconstructions of others, in the same words
   // as for those that are not there.
   absl::Status Check(const Caller& caller, const Request& request);
+  // Counts and tells a refusal that somebody else found necessary; returns `why`.
+  absl::Status Refused(const Caller& caller, const Request& request, absl::Status why);
   // ResourceExhausted where the user has too many already.
   absl::Status CheckReconstructions(const Caller& caller);
   // Counts `bytes` of the file `path` that are on their way as its owner's, until they are released or a week is over.
@@ -98,7 +100,6 @@ class Gatekeeper {
  private:
   absl::StatusOr<Caller> Find(const std::string& key, const std::string& address);
   absl::Status CheckQuietly(const Caller& caller, const Request& request);
-  absl::Status Refused(const Caller& caller, const Request& request, absl::Status why);
 
   struct Reserved {
     std::string owner;

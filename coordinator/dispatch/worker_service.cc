@@ -4,6 +4,7 @@
 #include <future>
 #include <utility>
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
@@ -80,6 +81,17 @@ absl::Status Validate(const v1::SynchronizeRequest& request) {
   return absl::OkStatus();
 }
 
+// "rack-7", and "rack-7+2" for several workers with one certificate. No host's name has a "+".
+absl::Status CheckName(const std::string& worker, const std::vector<std::string>& names) {
+  if (names.empty()) return absl::OkStatus();
+  for (const std::string& name : names) {
+    if (worker == name || absl::StartsWith(worker, name + "+")) return absl::OkStatus();
+  }
+  return absl::PermissionDeniedError(absl::StrCat("worker_id is \"", worker, "\", the certificate says \"",
+                                                  names.front(), "\": expected that, or \"", names.front(),
+                                                  "+\" and more"));
+}
+
 double Gibibytes(int64_t bytes) { return static_cast<double>(bytes) / static_cast<double>(int64_t{1} << 30); }
 
 // `workers`: by the version of their method.
@@ -151,8 +163,10 @@ void WorkerService::SetListener(std::function<void(const std::string&)> listener
   listener_ = std::move(listener);
 }
 
-int64_t WorkerService::Synchronize(const v1::SynchronizeRequest& request, Answer answer) {
+int64_t WorkerService::Synchronize(const v1::SynchronizeRequest& request, Answer answer,
+                                   const WorkerIdentity& identity) {
   absl::Status status = Validate(request);
+  if (status.ok()) status = CheckName(request.worker_id(), identity.names);
   {
     const MutexLock lock(mutex_);
     if (stopping_ && status.ok()) status = absl::UnavailableError("the coordinator is going down");
@@ -167,6 +181,7 @@ int64_t WorkerService::Synchronize(const v1::SynchronizeRequest& request, Answer
       calls_.push_back({.number = next_call_++,
                         .request = request,
                         .report = FromProto(request),
+                        .identity = identity,
                         .answer = std::move(answer),
                         .deadline = deadline});
       awake_ = true;
@@ -228,13 +243,14 @@ void WorkerService::AnswerCalls() {
     abandoned.swap(abandoned_);
     stopping = stopping_;
   }
-  std::map<std::string, int64_t> newest;
-  for (const Call& call : calls) newest[call.request.worker_id()] = call.number;
+  std::map<std::pair<std::string, std::string>, int64_t> newest;
+  const auto caller = [](const Call& call) { return std::pair(call.identity.owner, call.request.worker_id()); };
+  for (const Call& call : calls) newest[caller(call)] = call.number;
   for (auto call = calls.begin(); call != calls.end();) {
     absl::Status end;
     if (std::find(abandoned.begin(), abandoned.end(), call->number) != abandoned.end()) {
       end = absl::CancelledError("the worker does not wait any more");
-    } else if (newest[call->request.worker_id()] != call->number) {
+    } else if (newest[caller(*call)] != call->number) {
       end = absl::AbortedError(absl::StrCat("worker ", call->request.worker_id(), " has called again"));
     }
     if (end.ok()) {
@@ -264,7 +280,8 @@ void WorkerService::AnswerCalls() {
 absl::Status WorkerService::MakePass(std::list<Call>& calls) {
   MW_ASSIGN_OR_RETURN(const absl::Time now, store_.Now());
   MW_ASSIGN_OR_RETURN(std::vector<OpenJob> open, store_.ListOpenJobs());
-  MW_RETURN_IF_ERROR(LookAtWorkers(now));
+  MW_RETURN_IF_ERROR(LookAtWorkers(calls, now));
+  RefuseImpostors(calls);
   last_pass_ = now;
   watch_.Observe(open, clock_.Uptime());
 
@@ -327,11 +344,12 @@ std::vector<WorkerRecord> WorkerService::Heartbeats(const std::list<Call>& calls
                                 .version = request.version(),
                                 .draining = request.draining(),
                                 .method_version = request.method_version(),
-                                .colmap_version = request.colmap_version()};
+                                .colmap_version = request.colmap_version(),
+                                .owner = call.identity.owner};
     const bool is_same = before.cores == heard.cores && before.memory_bytes == heard.memory_bytes &&
                          before.instance == heard.instance && before.version == heard.version &&
                          before.draining == heard.draining && before.method_version == heard.method_version &&
-                         before.colmap_version == heard.colmap_version;
+                         before.colmap_version == heard.colmap_version && before.owner == heard.owner;
     // One that is still to come was written before the clock was set back.
     const absl::Duration age = now - before.last_heartbeat;
     if (!is_same || age > lease_.lease / 4 || age < absl::ZeroDuration()) heartbeats.push_back(heard);
@@ -339,12 +357,18 @@ std::vector<WorkerRecord> WorkerService::Heartbeats(const std::list<Call>& calls
   return heartbeats;
 }
 
-absl::Status WorkerService::LookAtWorkers(absl::Time now) {
+// A name that is new here may have come to another coordinator just now, from somebody else.
+absl::Status WorkerService::LookAtWorkers(const std::list<Call>& calls, absl::Time now) {
+  const bool has_new_owner = std::any_of(calls.begin(), calls.end(), [&](const Call& call) {
+    const auto known = written_workers_.find(call.request.worker_id());
+    return !call.is_heard && !call.identity.owner.empty() &&
+           (known == written_workers_.end() || known->second.owner != call.identity.owner);
+  });
   {
     const MutexLock lock(mutex_);
     const absl::Duration age = now - last_look_at_workers_;
     const bool is_due = age >= std::min(lease_.lease / 4, kLookAtWorkers) || age < absl::ZeroDuration();
-    if (!is_due && !workers_changed_) return absl::OkStatus();
+    if (!is_due && !workers_changed_ && !has_new_owner) return absl::OkStatus();
     workers_changed_ = false;
   }
   // Not when the clock has just jumped, or nobody could be heard.
@@ -356,6 +380,26 @@ absl::Status WorkerService::LookAtWorkers(absl::Time now) {
   written_workers_.clear();
   for (const WorkerRecord& worker : workers) written_workers_[worker.id] = worker;
   return absl::OkStatus();
+}
+
+// What a worker holds is lost when its process is another one, so that a name is worth something: it is the owner's who
+// came with it first, or whose certificate says so.
+void WorkerService::RefuseImpostors(std::list<Call>& calls) const {
+  std::map<std::string, std::string> owners;
+  for (auto call = calls.begin(); call != calls.end();) {
+    const std::string& id = call->request.worker_id();
+    const std::string& owner = call->identity.owner;
+    const auto known = written_workers_.find(id);
+    const bool is_taken = call->identity.names.empty() && known != written_workers_.end() &&
+                          !known->second.owner.empty() && known->second.owner != owner;
+    if (owner.empty() || (!is_taken && owners.try_emplace(id, owner).first->second == owner)) {
+      ++call;
+      continue;
+    }
+    call->answer(absl::PermissionDeniedError(
+        absl::StrCat("worker_id is \"", id, "\", which a worker with another key has: choose another --worker-id")));
+    call = calls.erase(call);
+  }
 }
 
 absl::StatusOr<WorkerService::Background> WorkerService::BackgroundOf(const std::string& reconstruction) {

@@ -25,6 +25,12 @@
 
 namespace meshwright {
 
+// Who a worker has shown to be.
+struct WorkerIdentity {
+  std::string owner;               // whose key or certificate it came with; "": nobody asked for one
+  std::vector<std::string> names;  // that its certificate vouches for; none: it is known by a key
+};
+
 // The coordinator's side of the worker protocol, without a network. Who holds which job is in the JobStore alone, so
 // any coordinator answers any worker. One thread makes passes: all calls that came since the pass before are answered
 // from one look at the open jobs, and what they change is written in one transaction; calls that find nothing new wait
@@ -39,8 +45,10 @@ class WorkerService {
   ~WorkerService();
 
   // Answers up to request.wait_timeout_seconds later, while there is nothing that the worker does not know; from
-  // another thread, and exactly once. InvalidArgument names the field. Returns the call's number.
-  int64_t Synchronize(const v1::SynchronizeRequest& request, Answer answer);
+  // another thread, and exactly once. InvalidArgument names the field. PermissionDenied: the worker's id is not one
+  // that its certificate vouches for, or another owner's until that has been silent for long. Returns the call's
+  // number.
+  int64_t Synchronize(const v1::SynchronizeRequest& request, Answer answer, const WorkerIdentity& identity = {});
   // The caller does not wait any more: the answer is Cancelled, unless there was one already.
   void Abandon(int64_t call);
   // The same for callers that wait; `cancelled` is asked now and then.
@@ -73,6 +81,7 @@ class WorkerService {
     int64_t number = 0;
     v1::SynchronizeRequest request;
     WorkerReport report;  // the same
+    WorkerIdentity identity;
     Answer answer;
     std::chrono::steady_clock::time_point deadline;
     bool is_heard = false;
@@ -89,7 +98,8 @@ class WorkerService {
   absl::Status MakePass(std::list<Call>& calls);
   void Tell(const std::set<std::string>& news);
   std::vector<WorkerRecord> Heartbeats(const std::list<Call>& calls, absl::Time now);
-  absl::Status LookAtWorkers(absl::Time now);
+  absl::Status LookAtWorkers(const std::list<Call>& calls, absl::Time now);
+  void RefuseImpostors(std::list<Call>& calls) const;
   absl::StatusOr<v1::CameraJob> FullJob(const OpenJob& job);
   static absl::StatusOr<v1::CameraJob> EstimationJob(const OpenJob& job, const CameraJob& stored);
   void NoteSteps(const WorkerReport& report);

@@ -1,7 +1,11 @@
 #include "coordinator/grpc/grpc_gate.h"
 
+#include <memory>
+#include <utility>
+#include <vector>
+
 #include <absl/strings/match.h>
-#include <absl/strings/str_cat.h>
+#include <grpc/grpc_security_constants.h>
 
 #include "common/base/status_macros.h"
 #include "coordinator/api/public_text.h"
@@ -17,6 +21,21 @@ std::string AddressOf(const std::string& peer) {
   return peer.substr(begin + 1, end - begin - 1);
 }
 
+constexpr size_t kMaxNames = 64;
+
+// What the certificate that the connection was made with says, if those trusted have signed it.
+std::vector<std::string> CertifiedNames(const grpc::ServerContextBase& context) {
+  std::vector<std::string> names;
+  const std::shared_ptr<const grpc::AuthContext> about = context.auth_context();
+  if (about == nullptr) return names;
+  for (const char* property : {GRPC_X509_CN_PROPERTY_NAME, GRPC_X509_SAN_PROPERTY_NAME}) {
+    for (const grpc::string_ref& name : about->FindPropertyValues(property)) {
+      if (!name.empty() && names.size() < kMaxNames) names.emplace_back(name.data(), name.size());
+    }
+  }
+  return names;
+}
+
 }  // namespace
 
 grpc::Status ToGrpc(const absl::Status& status) {
@@ -30,6 +49,12 @@ absl::StatusOr<Caller> Identify(Gatekeeper& gate, const grpc::ServerContextBase&
     constexpr char kBearer[] = "Bearer ";
     const std::string text(header->second.data(), header->second.size());
     if (absl::StartsWith(text, kBearer)) key = text.substr(sizeof(kBearer) - 1);
+  } else if (std::vector<std::string> names = CertifiedNames(context); !names.empty() && !gate.is_open()) {
+    return Caller{.token_id = "client-ca-file",
+                  .user = names.front(),
+                  .role = Role::kWorker,
+                  .address = AddressOf(context.peer()),
+                  .certified_names = std::move(names)};
   }
   return gate.Identify(key, AddressOf(context.peer()));
 }

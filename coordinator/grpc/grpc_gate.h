@@ -13,7 +13,7 @@ namespace meshwright {
 
 grpc::Status ToGrpc(const absl::Status& status);
 
-// Whose key the call carries.
+// Whose key the call carries; where it carries none, the worker whose certificate the connection was made with.
 absl::StatusOr<Caller> Identify(Gatekeeper& gate, const grpc::ServerContextBase& context);
 
 // Who makes this call, if it may be made.

@@ -244,15 +244,26 @@ class ReconstructionServiceImpl final : public v1::ReconstructionService::Servic
   LongCalls long_calls_{kMaxLongCalls, kMaxLongCallsOfOne};
 };
 
+WorkerIdentity IdentityOf(const Gatekeeper& gate, const Caller& caller) {
+  if (gate.is_open()) return {};
+  return {.owner = absl::StrCat(caller.certified_names.empty() ? "user " : "certificate ", caller.user),
+          .names = caller.certified_names};
+}
+
 // A call that waits for work waits without a thread of its own: the service answers it when there is something to say.
 class WaitingWorker final : public grpc::ServerUnaryReactor {
  public:
-  WaitingWorker(WorkerService& service, const v1::SynchronizeRequest& request, v1::SynchronizeResponse& response)
+  // `refused` is told when it is not the worker that it says to be.
+  WaitingWorker(WorkerService& service, const WorkerIdentity& identity, std::function<void(absl::Status)> refused,
+                const v1::SynchronizeRequest& request, v1::SynchronizeResponse& response)
       : service_(service) {
-    call_ = service_.Synchronize(request, [this, &response](absl::StatusOr<v1::SynchronizeResponse> answer) {
+    const auto answered = [this, refused = std::move(refused),
+                           &response](absl::StatusOr<v1::SynchronizeResponse> answer) {
+      if (absl::IsPermissionDenied(answer.status())) refused(answer.status());
       if (answer.ok()) response = *std::move(answer);
       Finish(ToGrpc(answer.status()));
-    });
+    };
+    call_ = service_.Synchronize(request, answered, identity);
     {
       const MutexLock lock(mutex_);
       is_known_ = true;
@@ -288,12 +299,17 @@ class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Syn
 
   grpc::ServerUnaryReactor* Synchronize(grpc::CallbackServerContext* context, const v1::SynchronizeRequest* request,
                                         v1::SynchronizeResponse* response) override {
-    if (const auto caller = Enter(gate_, *context, {.action = Action::kWork, .deed = "Synchronize"}); !caller.ok()) {
+    const Request deed = {.action = Action::kWork, .deed = "Synchronize"};
+    const absl::StatusOr<Caller> caller = Enter(gate_, *context, deed);
+    if (!caller.ok()) {
       grpc::ServerUnaryReactor* const refused = context->DefaultReactor();
       refused->Finish(ToGrpc(caller.status()));
       return refused;
     }
-    return new WaitingWorker(service_, *request, *response);
+    const auto refused = [this, deed, caller = *caller](absl::Status why) {
+      gate_.Refused(caller, deed, std::move(why)).IgnoreError();
+    };
+    return new WaitingWorker(service_, IdentityOf(gate_, *caller), refused, *request, *response);
   }
   grpc::Status FetchBlob(grpc::ServerContext* context, const v1::FetchBlobRequest* request,
                          grpc::ServerWriter<v1::FetchBlobResponse>* writer) override {
@@ -345,9 +361,14 @@ class WorkerServiceImpl final : public v1::WorkerService::WithCallbackMethod_Syn
 std::shared_ptr<grpc::ServerCredentials> CredentialsOf(const GrpcServerOptions& options) {
   if (options.tls_certificate_file.empty()) return grpc::InsecureServerCredentials();
   const auto provider = std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(
-      options.tls_key_file, options.tls_certificate_file, kReadCertificatesEverySeconds);
+      options.tls_key_file, options.tls_certificate_file, options.client_ca_file, kReadCertificatesEverySeconds);
   grpc::experimental::TlsServerCredentialsOptions tls(provider);
   tls.watch_identity_key_cert_pairs();
+  if (!options.client_ca_file.empty()) {
+    tls.watch_root_certs();
+    // Who shows none may still show a key; one that nobody of the file has signed ends the connection.
+    tls.set_cert_request_type(GRPC_SSL_REQUEST_CLIENT_CERTIFICATE_AND_VERIFY);
+  }
   return grpc::experimental::TlsServerCredentials(tls);
 }
 

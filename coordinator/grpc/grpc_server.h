@@ -19,6 +19,7 @@ struct GrpcServerOptions {
   std::string listen;                // "host:port"; port 0 takes a free one
   std::string tls_certificate_file;  // PEM, read again when it changes; "": no TLS
   std::string tls_key_file;          // PEM
+  std::string client_ca_file;        // PEM, who may vouch for workers, read again when it changes; "": keys alone count
   bool reflection = false;           // tell everybody which calls there are
 };
 

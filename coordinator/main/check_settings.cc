@@ -88,7 +88,7 @@ absl::Status CheckSettings(const CoordinatorSettings& settings) {
   if (settings.tls_certificate_file.empty() != settings.tls_key_file.empty()) {
     return absl::InvalidArgumentError("--tls-cert and --tls-key: expected both or none");
   }
-  for (const std::string& file : {settings.tls_certificate_file, settings.tls_key_file}) {
+  for (const std::string& file : {settings.tls_certificate_file, settings.tls_key_file, settings.client_ca_file}) {
     if (!file.empty()) MW_RETURN_IF_ERROR(ReadFile(file).status());
   }
   MW_RETURN_IF_ERROR(ReadTokenFile(settings.api_token_file, "--api-token-file").status());
@@ -96,6 +96,12 @@ absl::Status CheckSettings(const CoordinatorSettings& settings) {
   if (settings.api_token_file.empty() && !settings.worker_token_file.empty()) {
     return absl::InvalidArgumentError(
         "--worker-token-file: expected with --api-token-file, or nobody is asked for a key");
+  }
+  if (!settings.client_ca_file.empty() && settings.tls_certificate_file.empty()) {
+    return absl::InvalidArgumentError("--client-ca-file: expected with --tls-cert and --tls-key");
+  }
+  if (!settings.client_ca_file.empty() && settings.api_token_file.empty()) {
+    return absl::InvalidArgumentError("--client-ca-file: expected with --api-token-file, or nobody is asked for a key");
   }
   return CheckExposure(settings);
 }

@@ -52,6 +52,10 @@ void AddAccessOptions(CLI::App& program, CoordinatorSettings& settings) {
                                        "file with the certificate for gRPC and those above it, PEM; read again when it "
                                        "changes [no TLS]"));
   NameInEnvironment(program.add_option("--tls-key", settings.tls_key_file, "file with its key, PEM"));
+  NameInEnvironment(program.add_option("--client-ca-file", settings.client_ca_file,
+                                       "file with the certificates of those who may vouch for workers, PEM; read again "
+                                       "when it changes: a worker may then show a certificate in place of a key [keys "
+                                       "alone count]"));
   NameInEnvironment(program.add_flag("--grpc-reflection", settings.grpc_reflection,
                                      "tell everybody over gRPC which calls there are"));
   NameInEnvironment(

@@ -132,6 +132,7 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
                         GrpcServer::Start({.listen = settings_.listen,
                                            .tls_certificate_file = settings_.tls_certificate_file,
                                            .tls_key_file = settings_.tls_key_file,
+                                           .client_ca_file = settings_.client_ca_file,
                                            .reflection = settings_.grpc_reflection},
                                           *reconstructions_, *workers_, *blobs_, *gate_, std::move(interceptors)));
     MW_ASSIGN_OR_RETURN(rest_server_,

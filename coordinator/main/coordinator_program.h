@@ -29,6 +29,7 @@ struct CoordinatorSettings {
   std::string webhook_secret_file;           // what that is signed with is in it
   std::string tls_certificate_file;          // PEM, for gRPC; "": no TLS
   std::string tls_key_file;                  // PEM
+  std::string client_ca_file;                // PEM, who may vouch for workers; "": keys alone count
   bool grpc_reflection = false;
   std::string api_token_file;     // the operator's key is in it; "": nobody has to show one
   std::string worker_token_file;  // the key that workers join with; "": each has one of its own

@@ -131,7 +131,9 @@ void SchedulingPass::ApplyHeldJob(const WorkerReport& report, const HeldJob& hel
   const OpenJob& job = jobs_[index];
   // Taken already, or somebody else has the job now.
   if (job.epoch != held.key.epoch || changed_[index]) return;
-  const bool is_leased = job.lease_worker == report.worker && job.lease_instance == report.instance;
+  // The process that had it last, too: it may be late. Nobody brings results of jobs that it was never given.
+  if (job.lease_instance != report.instance) return;
+  const bool is_leased = job.lease_worker == report.worker;
   if (!is_leased && !job.lease_worker.empty()) return;
   if (const auto* const finished = std::get_if<JobFinished>(&held.outcome)) {
     ApplyFinished(index, is_leased, *finished);

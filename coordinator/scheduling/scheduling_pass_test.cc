@@ -295,8 +295,10 @@ TEST(SchedulingPassTest, LosingWorkersCountsApartAndEndsToo) {
 }
 
 TEST(SchedulingPassTest, ResultsAreTakenFromTheHolderOrFromWhoWasLateAndIsTheOnlyOne) {
-  const auto changes_of = [](const OpenJob& job, int64_t epoch, const std::string& worker) {
+  const auto changes_of = [](const OpenJob& job, int64_t epoch, const std::string& worker,
+                             const std::string& instance = "1") {
     WorkerReport report = Worker(worker);
+    report.instance = instance;
     HeldJob& held = Hold(report, job);
     held.key.epoch = epoch;
     held.outcome = JobFinished{.filtered_digest = std::string(64, 'a'), .report_json = "{}"};
@@ -311,6 +313,9 @@ TEST(SchedulingPassTest, ResultsAreTakenFromTheHolderOrFromWhoWasLateAndIsTheOnl
   job.lease_worker.clear();
   EXPECT_THAT(changes_of(job, 2, "w"), ElementsAre("complete a1"));
   EXPECT_THAT(changes_of(job, 1, "w"), IsEmpty());
+  // Another process was never given it, whatever it calls itself.
+  EXPECT_THAT(changes_of(job, 2, "w", "2"), IsEmpty());
+  EXPECT_THAT(changes_of(Waiting("a", 1), 1, "w"), IsEmpty());
 }
 
 TEST(SchedulingPassTest, AResultThatIsNoneIsAFailure) {

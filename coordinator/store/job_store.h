@@ -207,6 +207,7 @@ struct WorkerRecord {
   bool draining = false;       // it says so itself
   int64_t method_version = 0;  // 0: it does not say
   std::string colmap_version;  // "": it cannot estimate cameras
+  std::string owner;           // whose key or certificate it came with; "": nobody asked for one
 };
 
 struct SceneFile {

@@ -817,7 +817,8 @@ TEST_P(JobStoreConformance, WorkersAreKnownByTheirHeartbeats) {
          .version = "7",
          .draining = true,
          .method_version = 3,
-         .colmap_version = "3.8"};
+         .colmap_version = "3.8",
+         .owner = "user hive"};
   ASSERT_TRUE(store().ApplyChanges({}, {ant}, kNow).ok());
   Reopen();
   const auto workers = store().ListWorkers();
@@ -832,6 +833,7 @@ TEST_P(JobStoreConformance, WorkersAreKnownByTheirHeartbeats) {
   EXPECT_EQ(workers->at(0).method_version, 3);
   EXPECT_EQ(workers->at(1).method_version, 0);
   EXPECT_EQ(workers->at(0).colmap_version, "3.8");
+  EXPECT_EQ(workers->at(0).owner, "user hive");
   EXPECT_TRUE(workers->at(0).drained);
   EXPECT_TRUE(workers->at(0).draining);
   EXPECT_EQ(workers->at(1).memory_bytes, 8'000'000'000);

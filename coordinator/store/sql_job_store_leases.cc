@@ -98,7 +98,8 @@ SqlCall HeartbeatCall(const WorkerRecord& worker) {
            {"version", worker.version},
            {"draining", worker.draining ? 1 : 0},
            {"method_version", worker.method_version},
-           {"colmap_version", worker.colmap_version}}};
+           {"colmap_version", worker.colmap_version},
+           {"owner", worker.owner}}};
 }
 
 }  // namespace
@@ -257,7 +258,8 @@ absl::StatusOr<std::vector<WorkerRecord>> SqlJobStore::ListWorkers() {
                        .version = row.Text(6),
                        .draining = row.Integer(7) != 0,
                        .method_version = row.Integer(8),
-                       .colmap_version = row.Text(9)});
+                       .colmap_version = row.Text(9),
+                       .owner = row.Text(10)});
   }
   return workers;
 }

@@ -129,7 +129,9 @@ std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& add
       grpc::CreateCustomChannel(address,
                                 credentials.ca_certificates.empty()
                                     ? grpc::InsecureChannelCredentials()
-                                    : grpc::SslCredentials({.pem_root_certs = credentials.ca_certificates}),
+                                    : grpc::SslCredentials({.pem_root_certs = credentials.ca_certificates,
+                                                            .pem_private_key = credentials.private_key,
+                                                            .pem_cert_chain = credentials.certificate}),
                                 arguments),
       credentials.key);
 }

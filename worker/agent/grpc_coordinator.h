@@ -11,6 +11,8 @@ namespace meshwright {
 struct CoordinatorCredentials {
   std::string key;              // "": none is shown
   std::string ca_certificates;  // PEM, of those who may vouch for the coordinator; "": no TLS
+  std::string certificate;      // PEM, the worker's own and those above it; "": none is shown
+  std::string private_key;      // PEM
 };
 
 // A coordinator at "host:port", as a WorkerChannel, and as a BlobStore for workers that reach no other: Put and Get

@@ -15,6 +15,10 @@ void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {
   NameInEnvironment(program.add_option(
       "--ca-file", settings.ca_file,
       "file with the certificates of those who may vouch for the coordinator, PEM; turns TLS on [no TLS]"));
+  NameInEnvironment(program.add_option("--client-cert", settings.client_certificate_file,
+                                       "file with the worker's certificate and those above it, PEM: it stands for a "
+                                       "key; --worker-id is its name, or that, \"+\" and more [none is shown]"));
+  NameInEnvironment(program.add_option("--client-key", settings.client_key_file, "file with its key, PEM"));
   NameInEnvironment(program.add_option("--cores", settings.cores, "jobs at the same time, and cores for all of them")
                         ->check(CLI::Range(1, 1024))
                         ->capture_default_str());

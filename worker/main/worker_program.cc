@@ -42,6 +42,14 @@ absl::StatusOr<CoordinatorCredentials> ReadCredentials(const WorkerSettings& set
   if (!settings.ca_file.empty()) {
     MW_ASSIGN_OR_RETURN(credentials.ca_certificates, ReadFile(settings.ca_file));
   }
+  if (settings.client_certificate_file.empty() != settings.client_key_file.empty()) {
+    return absl::InvalidArgumentError("--client-cert and --client-key: expected both or none");
+  }
+  if (!settings.client_certificate_file.empty()) {
+    if (settings.ca_file.empty()) return absl::InvalidArgumentError("--client-cert: expected with --ca-file");
+    MW_ASSIGN_OR_RETURN(credentials.certificate, ReadFile(settings.client_certificate_file));
+    MW_ASSIGN_OR_RETURN(credentials.private_key, ReadFile(settings.client_key_file));
+  }
   return credentials;
 }
 

@@ -13,6 +13,8 @@ struct WorkerSettings {
   std::string blobs;                           // the coordinator's, as for OpenBlobStore; "": through the coordinator
   std::string token_file;                      // with the key to join with; "": none is shown
   std::string ca_file;                         // PEM, of those who may vouch for the coordinator; "": no TLS
+  std::string client_certificate_file;         // PEM, with the worker's name; "": none is shown
+  std::string client_key_file;                 // PEM
   int cores = 1;
   int64_t memory_mib = 0;  // 0: 512 for each core, at least 1024
   double drain_seconds = 30;

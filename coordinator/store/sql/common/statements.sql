@@ -229,21 +229,21 @@ ORDER BY r.id;
 
 -- name: record_heartbeat
 INSERT INTO workers (id, cores, memory_bytes, last_heartbeat, instance, version, draining, method_version,
-                     colmap_version)
+                     colmap_version, owner)
 VALUES (:worker, :cores, :memory_bytes, :now, :instance, :version, :draining, :method_version,
-        :colmap_version)
+        :colmap_version, :owner)
 ON CONFLICT (id) DO UPDATE
 SET cores = excluded.cores, memory_bytes = excluded.memory_bytes, last_heartbeat = excluded.last_heartbeat,
     drained = CASE WHEN workers.instance = excluded.instance THEN workers.drained ELSE 0 END,
     instance = excluded.instance, version = excluded.version, draining = excluded.draining,
-    method_version = excluded.method_version, colmap_version = excluded.colmap_version;
+    method_version = excluded.method_version, colmap_version = excluded.colmap_version, owner = excluded.owner;
 
 -- name: set_worker_drained
 UPDATE workers SET drained = :drained WHERE id = :worker;
 
 -- name: list_workers
 SELECT id, cores, memory_bytes, last_heartbeat, drained, instance, version, draining, method_version,
-       colmap_version
+       colmap_version, owner
 FROM workers ORDER BY id;
 
 -- name: remove_silent_workers
