@@ -77,6 +77,10 @@ absl::StatusOr<Caller> Gatekeeper::Identify(const std::string& key, const std::s
   return Refused({.user = "", .role = Role::kViewer, .address = address}, {.deed = "identify"}, caller.status());
 }
 
+bool Gatekeeper::KnowsAtOnce(const std::string& key) const {
+  return is_open() || EqualInConstantTime(Sha256Hex(key), options_.operator_key_digest);
+}
+
 absl::StatusOr<Caller> Gatekeeper::Find(const std::string& key, const std::string& address) {
   const std::string digest = Sha256Hex(key);
   if (EqualInConstantTime(digest, options_.operator_key_digest)) {
@@ -132,16 +136,24 @@ absl::Status Gatekeeper::ReserveSceneBytes(const std::string& reconstruction, co
   const absl::StatusOr<Reconstruction> stored = store_.GetReconstruction(reconstruction);
   if (absl::IsNotFound(stored.status())) return absl::OkStatus();  // others say so
   MW_RETURN_IF_ERROR(stored.status());
-  const std::string& owner = stored->owner;
-  if (owner.empty()) return absl::OkStatus();
+  return stored->owner.empty() ? absl::OkStatus() : Reserve(stored->owner, {reconstruction, path}, bytes);
+}
+
+absl::Status Gatekeeper::ReserveBytes(const Caller& caller, const std::string& name, int64_t bytes) {
+  if (is_open() || caller.role == Role::kOperator) return absl::OkStatus();
+  return Reserve(caller.user, {"", name}, bytes);
+}
+
+absl::Status Gatekeeper::Reserve(const std::string& owner, const std::pair<std::string, std::string>& file,
+                                 int64_t bytes) {
   MW_ASSIGN_OR_RETURN(const Usage usage, store_.UsageOf(owner));
   const absl::Time now = clock_.Now();
   const MutexLock lock(mutex_);
   std::erase_if(reserved_, [&](const auto& entry) { return now - entry.second.at > kReservation; });
   int64_t on_their_way = bytes;
   size_t files = 0;
-  for (const auto& [file, other] : reserved_) {
-    if (other.owner != owner || file == std::pair(reconstruction, path)) continue;
+  for (const auto& [other_file, other] : reserved_) {
+    if (other.owner != owner || other_file == file) continue;
     on_their_way += other.bytes;
     ++files;
   }
@@ -153,7 +165,7 @@ absl::Status Gatekeeper::ReserveSceneBytes(const std::string& reconstruction, co
                                                      " bytes and would have ", on_their_way,
                                                      " on their way, allowed are ", options_.quotas.scene_bytes));
   }
-  reserved_[{reconstruction, path}] = {.owner = owner, .bytes = bytes, .at = now};
+  reserved_[file] = {.owner = owner, .bytes = bytes, .at = now};
   return absl::OkStatus();
 }
 

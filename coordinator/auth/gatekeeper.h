@@ -78,6 +78,8 @@ class Gatekeeper {
   // Whose key this is. Unauthenticated for every other: it does not say whether there ever was one like it.
   // ResourceExhausted: too many requests a second.
   absl::StatusOr<Caller> Identify(const std::string& key, const std::string& address);
+  // Whether Identify() answers at once, without asking the store.
+  bool KnowsAtOnce(const std::string& key) const;
   // Whether the caller may do this. PermissionDenied by role; NotFound for reconstructions of others, in the same words
   // as for those that are not there.
   absl::Status Check(const Caller& caller, const Request& request);
@@ -88,7 +90,9 @@ class Gatekeeper {
   // Counts `bytes` of the file `path` that are on their way as its owner's, until they are released or a week is over.
   // ResourceExhausted where the owner would have too much.
   absl::Status ReserveSceneBytes(const std::string& reconstruction, const std::string& path, int64_t bytes);
-  // Of one file; with path "": of all.
+  // The same before there is a reconstruction: of the caller, under a name that nobody else uses meanwhile.
+  absl::Status ReserveBytes(const Caller& caller, const std::string& name, int64_t bytes);
+  // Of one file; with path "": of all. With reconstruction "": what ReserveBytes() has counted under the name `path`.
   void ReleaseSceneBytes(const std::string& reconstruction, const std::string& path = "");
 
   // Operators make any key, submitters links to what is theirs. InvalidArgument names the field.
@@ -100,6 +104,7 @@ class Gatekeeper {
  private:
   absl::StatusOr<Caller> Find(const std::string& key, const std::string& address);
   absl::Status CheckQuietly(const Caller& caller, const Request& request);
+  absl::Status Reserve(const std::string& owner, const std::pair<std::string, std::string>& file, int64_t bytes);
 
   struct Reserved {
     std::string owner;

@@ -137,7 +137,8 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
                                           *reconstructions_, *workers_, *blobs_, *gate_, std::move(interceptors)));
     MW_ASSIGN_OR_RETURN(rest_server_,
                         OpenRest(settings_, *reconstructions_, *workers_, *blobs_, *store_, *gate_, pool_, log_));
-    MW_ASSIGN_OR_RETURN(nodeodm_server_, OpenNodeOdm(settings_, *reconstructions_, *workers_, *blobs_, clock_, log_));
+    MW_ASSIGN_OR_RETURN(nodeodm_server_,
+                        OpenNodeOdm(settings_, *reconstructions_, *workers_, *blobs_, *gate_, clock_, log_));
     MW_RETURN_IF_ERROR(ServeMetrics());
     return absl::OkStatus();
   }

@@ -7,7 +7,6 @@
 
 #include "common/base/status_macros.h"
 #include "common/base/thread_pool.h"
-#include "common/base/token_file.h"
 #include "common/mesh/formats/mesh_format.h"
 #include "common/mesh/ply.h"
 
@@ -28,8 +27,8 @@ absl::Status WriteTextured(const Scene& scene, const std::string& options_json, 
 
 absl::StatusOr<std::unique_ptr<NodeOdmServer>> OpenNodeOdm(const CoordinatorSettings& settings,
                                                            ReconstructionService& reconstructions,
-                                                           WorkerService& workers, BlobStore& blobs, const Clock& clock,
-                                                           const Logger& log) {
+                                                           WorkerService& workers, BlobStore& blobs, Gatekeeper& gate,
+                                                           const Clock& clock, const Logger& log) {
   if (settings.nodeodm_listen.empty()) return nullptr;
   NodeOdmOptions options = {.listen = settings.nodeodm_listen,
                             .folder = settings.data_folder + "/nodeodm",
@@ -38,11 +37,11 @@ absl::StatusOr<std::unique_ptr<NodeOdmServer>> OpenNodeOdm(const CoordinatorSett
                             .max_images = settings.nodeodm_max_images};
   options.trusted_proxies = {settings.trusted_proxies.begin(), settings.trusted_proxies.end()};
   options.warn = [&log](const std::string& text) { log.Warning(text); };
-  MW_ASSIGN_OR_RETURN(options.token, ReadTokenFile(settings.api_token_file, "--api-token-file"));
   const NodeOdmServices services = {
       .reconstructions = &reconstructions,
       .workers = &workers,
       .blobs = &blobs,
+      .gate = &gate,
       .clock = &clock,
       .options_json = DescribeOptionsForRest(),
       .write_textured_glb = [threads = settings.threads](const Scene& scene, const std::string& options_json,

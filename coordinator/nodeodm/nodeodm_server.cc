@@ -14,16 +14,17 @@
 #include <absl/strings/str_split.h>
 #include <nlohmann/json.hpp>
 
-#include "common/base/digest.h"
 #include "common/base/relative_path.h"
 #include "common/base/status_macros.h"
 #include "common/base/version.h"
 #include "common/blob/staged_blob.h"
 #include "common/http_server/byte_range.h"
+#include "common/http_server/foreign_requests.h"
 #include "common/http_server/http_server.h"
 #include "common/json/parse_json.h"
 #include "coordinator/nodeodm/form_body.h"
 #include "coordinator/nodeodm/odm_options.h"
+#include "coordinator/nodeodm/odm_task.h"
 #include "coordinator/nodeodm/task_board.h"
 
 namespace meshwright {
@@ -36,6 +37,8 @@ constexpr char kProtocolVersion[] = "2.2.1";
 constexpr char kJsonType[] = "application/json";
 constexpr char kBadToken[] = "Invalid authentication token: token does not match.";
 constexpr int64_t kMaxBodyBytes = int64_t{1} << 40;
+// Bytes of a form that does not say how long it is are counted in such steps.
+constexpr int64_t kReserveBytes = int64_t{64} << 20;
 constexpr size_t kMaxOutputs = 1000;
 constexpr int kMinWorkers = 4;
 constexpr absl::Duration kShutdownGrace = absl::Seconds(2);
@@ -56,6 +59,12 @@ void AnswerError(HttpResponse& response, const absl::Status& status) {
   if (IsForGood(status)) json["noRetry"] = true;
   Answer(response, json);
   if (absl::IsUnavailable(status) || absl::IsResourceExhausted(status)) response.status = 503;
+  if (absl::IsPermissionDenied(status)) response.status = 403;
+}
+
+// A quota does not grow by sending again, and clients would.
+absl::Status ForGood(const absl::Status& status) {
+  return absl::IsResourceExhausted(status) ? absl::FailedPreconditionError(status.message()) : status;
 }
 
 void AnswerSuccess(HttpResponse& response, const absl::Status& status) {
@@ -74,11 +83,37 @@ struct RemoveStaged {
 };
 using StagedFile = std::unique_ptr<StagedBlob, RemoveStaged>;
 
+// What a form that is on its way may bring. It counts as its caller's until it is over.
+class FormAllowance {
+ public:
+  FormAllowance(Gatekeeper& gate, Caller caller) : gate_(gate), caller_(std::move(caller)), name_(DrawUuid()) {}
+  ~FormAllowance() { gate_.ReleaseSceneBytes("", name_); }
+  FormAllowance(const FormAllowance&) = delete;
+  FormAllowance& operator=(const FormAllowance&) = delete;
+
+  absl::Status Reserve(int64_t bytes) {
+    reserved_bytes_ = bytes;
+    return ForGood(gate_.ReserveBytes(caller_, name_, bytes));
+  }
+  absl::Status Take(size_t bytes) {
+    taken_bytes_ += static_cast<int64_t>(bytes);
+    return taken_bytes_ <= reserved_bytes_ ? absl::OkStatus() : Reserve(taken_bytes_ + kReserveBytes);
+  }
+
+ private:
+  Gatekeeper& gate_;
+  const Caller caller_;
+  const std::string name_;
+  int64_t reserved_bytes_ = 0;
+  int64_t taken_bytes_ = 0;
+};
+
 // A file among the images of a form, on its way.
 class Incoming {
  public:
   using Keep = std::function<absl::Status(const std::string& name, StagedFile file)>;
-  Incoming(std::string folder, Keep keep) : folder_(std::move(folder)), keep_(std::move(keep)) {}
+  Incoming(std::string folder, std::unique_ptr<FormAllowance> allowance, Keep keep)
+      : folder_(std::move(folder)), allowance_(std::move(allowance)), keep_(std::move(keep)) {}
 
   FormPartHandler Handler() {
     return {.begin = [this](const FormPart& part) -> absl::Status {
@@ -88,7 +123,10 @@ class Incoming {
               name_ = part.file_name;
               return absl::OkStatus();
             },
-            .append = [this](absl::Span<const uint8_t> bytes) { return file_->Append(bytes); },
+            .append = [this](absl::Span<const uint8_t> bytes) -> absl::Status {
+              MW_RETURN_IF_ERROR(allowance_->Take(bytes.size()));
+              return file_->Append(bytes);
+            },
             .end =
                 [this] {
                   ++count_;
@@ -99,6 +137,7 @@ class Incoming {
 
  private:
   const std::string folder_;
+  const std::unique_ptr<FormAllowance> allowance_;
   const Keep keep_;
   std::string name_;
   StagedFile file_;
@@ -177,14 +216,12 @@ absl::StatusOr<NewOdmTask> ParseNewTask(const FormBody& form, const std::string&
 class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
  public:
   RealNodeOdmServer(const NodeOdmOptions& options, const NodeOdmServices& services)
-      : options_(options),
-        services_(services),
-        token_digest_(Sha256Hex(options.token)),
-        task_options_(services.options_json) {}
+      : options_(options), services_(services), task_options_(services.options_json) {}
   ~RealNodeOdmServer() override { Shutdown(); }
 
   absl::Status Open() {
     MW_ASSIGN_OR_RETURN(board_, TaskBoard::Open(options_.folder, {.reconstructions = services_.reconstructions,
+                                                                  .gate = services_.gate,
                                                                   .blobs = services_.blobs,
                                                                   .options = &task_options_,
                                                                   .clock = services_.clock,
@@ -219,9 +256,11 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
                        [](const v1::Worker& worker) { return !worker.colmap_version().empty(); });
   }
 
-  // Clients take a node that does not answer at once for dead. These wait for neither the store nor the disk.
+  // Clients take a node that does not answer at once for dead. These wait for neither the store nor the disk; other
+  // keys than the operator's are looked up in the store.
   bool IsQuick(const HttpRequest& request) const override {
-    return request.method == "GET" && !absl::EndsWith(request.path, ".zip");
+    return request.method == "GET" && !absl::EndsWith(request.path, ".zip") &&
+           services_.gate->KnowsAtOnce(request.Param("token"));
   }
 
   void AnswerFault(const HttpFault& fault, HttpResponse& response) override {
@@ -240,15 +279,47 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
           response,
           {{"message", "A token is given by whoever runs this node"}, {"loginUrl", nullptr}, {"registerUrl", nullptr}});
     }
-    if (!options_.token.empty() && Sha256Hex(request.Param("token")) != token_digest_) {
-      Answer(response, {{"error", kBadToken}});
+    if (const absl::Status own = CheckOwnPage(request); !own.ok()) {
+      AnswerError(response, own);
+      return DropBody(exchange);
+    }
+    const absl::StatusOr<Caller> caller = services_.gate->Identify(request.Param("token"), request.caller);
+    if (!caller.ok()) {
+      RefuseKey(caller.status(), response);
       return DropBody(exchange);
     }
     const std::vector<std::string> path =
         absl::StrSplit(request.path.substr(std::min<size_t>(1, request.path.size())), '/');
-    if (request.method == "GET" || request.method == "HEAD") return Get(path, request, response);
-    if (request.method == "POST") return Post(path, exchange);
+    if (OnlyReads(request)) return Get(*caller, path, request, response);
+    if (request.method == "POST") return Post(*caller, path, exchange);
     Answer(response, {{"error", "Method not allowed"}});
+  }
+
+  // A page in somebody's browser could send forms here.
+  absl::Status CheckOwnPage(const HttpRequest& request) const {
+    if (IsRebound(request, options_.listen, options_.trusted_proxies)) {
+      return absl::PermissionDeniedError("Host is no name of this machine, expected localhost");
+    }
+    if (IsForeign(request)) return absl::PermissionDeniedError("Origin is another site, expected this one or none");
+    return absl::OkStatus();
+  }
+
+  // Clients know a wrong token by its words, with the status 200.
+  static void RefuseKey(const absl::Status& why, HttpResponse& response) {
+    if (absl::IsUnauthenticated(why)) return Answer(response, {{"error", kBadToken}});
+    AnswerError(response, why);
+    if (!absl::IsResourceExhausted(why)) return;
+    response.status = 429;
+    response.headers.Set("Retry-After", "1");
+  }
+
+  // Whether the caller may do this with the task; for others it does not exist.
+  absl::Status CheckTask(const Caller& caller, Action action, const std::string& deed, const std::string& uuid) const {
+    const Request request = {.action = action, .deed = IsUuid(uuid) ? absl::StrCat(deed, " ", uuid) : deed};
+    MW_RETURN_IF_ERROR(services_.gate->Check(caller, request));
+    const absl::StatusOr<std::string> owner = board_->OwnerOf(uuid);
+    if (!owner.ok()) return owner.status();
+    return MaySee(caller, uuid, *owner) ? absl::OkStatus() : services_.gate->Refused(caller, request, NoSuchTask());
   }
 
   // A client that is still sending would not read an answer in between.
@@ -261,14 +332,23 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
     });
   }
 
-  void Get(const std::vector<std::string>& path, const HttpRequest& request, HttpResponse& response) {
+  void Get(const Caller& caller, const std::vector<std::string>& path, const HttpRequest& request,
+           HttpResponse& response) {
     if (path.size() == 1 && path[0] == "info") return Info(request, response);
     if (path.size() == 1 && path[0] == "options") return response.SetContent(task_options_.description(), kJsonType);
-    if (path.size() == 2 && path[0] == "task" && path[1] == "list") return List(response);
-    if (path.size() == 3 && path[0] == "task" && path[2] == "info") return TaskInfo(path[1], request, response);
-    if (path.size() == 3 && path[0] == "task" && path[2] == "output") return Output(path[1], request, response);
-    if (path.size() == 4 && path[0] == "task" && path[2] == "download")
-      return Download(path[1], path[3], request, response);
+    if (path.size() == 2 && path[0] == "task" && path[1] == "list") return List(caller, response);
+    const bool is_of_task = path.size() >= 3 && path[0] == "task";
+    if (is_of_task && path.size() == 3 && (path[2] == "info" || path[2] == "output")) {
+      const absl::Status may = CheckTask(caller, Action::kRead, "GET /task/" + path[2], path[1]);
+      if (absl::IsNotFound(may))
+        return Answer(response, {{"error", absl::StrCat(path[1].substr(0, 64), " not found")}});
+      if (!may.ok()) return AnswerError(response, may);
+      return path[2] == "info" ? TaskInfo(path[1], request, response) : Output(path[1], request, response);
+    }
+    if (is_of_task && path.size() == 4 && path[2] == "download") {
+      const absl::Status may = CheckTask(caller, Action::kRead, "GET /task/download", path[1]);
+      return may.ok() ? Download(path[1], path[3], request, response) : AnswerError(response, may);
+    }
     Answer(response, {{"error", "There is nothing at this path"}});
   }
 
@@ -302,9 +382,11 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
     Answer(response, info);
   }
 
-  void List(HttpResponse& response) {
+  void List(const Caller& caller, HttpResponse& response) {
+    const absl::Status may = services_.gate->Check(caller, {.action = Action::kList, .deed = "GET /task/list"});
+    if (!may.ok()) return AnswerError(response, may);
     Json list = Json::array();
-    for (const std::string& uuid : board_->List()) list.push_back({{"uuid", uuid}});
+    for (const std::string& uuid : board_->List(caller)) list.push_back({{"uuid", uuid}});
     Answer(response, list);
   }
 
@@ -358,17 +440,31 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
                        });
   }
 
-  void Post(const std::vector<std::string>& path, HttpExchange& exchange) {
+  void Post(const Caller& caller, const std::vector<std::string>& path, HttpExchange& exchange) {
     const bool is_new = path.size() >= 2 && path[0] == "task" && path[1] == "new";
-    if (is_new && path.size() == 2) return NewTask(exchange);
-    if (is_new && path.size() == 3 && path[2] == "init") return Init(exchange);
-    if (is_new && path.size() == 4 && path[2] == "upload") return Upload(path[3], exchange);
-    if (is_new && path.size() == 4 && path[2] == "commit") return Commit(path[3], exchange);
+    if (is_new && path.size() == 2) return NewTask(caller, exchange);
+    if (is_new && path.size() == 3 && path[2] == "init") return Init(caller, exchange);
+    if (is_new && path.size() == 4 && path[2] == "upload") return Upload(caller, path[3], exchange);
+    if (is_new && path.size() == 4 && path[2] == "commit") return Commit(caller, path[3], exchange);
     if (path.size() == 2 && path[0] == "task" && (path[1] == "cancel" || path[1] == "remove" || path[1] == "restart")) {
-      return Change(path[1], exchange);
+      return Change(caller, path[1], exchange);
     }
     Answer(exchange.response, {{"error", path[0] == "auth" ? "Not available" : "There is nothing at this path"}});
     DropBody(exchange);
+  }
+
+  static void Refuse(HttpExchange& exchange, const absl::Status& why) {
+    AnswerError(exchange.response, why);
+    DropBody(exchange);
+  }
+
+  // For the body that is to come, as long as it says to be.
+  absl::StatusOr<std::unique_ptr<FormAllowance>> Allow(const Caller& caller, const HttpRequest& request) {
+    auto allowance = std::make_unique<FormAllowance>(*services_.gate, caller);
+    int64_t bytes = 0;
+    if (!absl::SimpleAtoi(request.headers.Get("Content-Length"), &bytes)) bytes = kReserveBytes;
+    MW_RETURN_IF_ERROR(allowance->Reserve(bytes));
+    return allowance;
   }
 
   static void TakeForm(HttpExchange& exchange, std::shared_ptr<Incoming> incoming, FormSink::Reply reply) {
@@ -381,23 +477,26 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
     }
   }
 
-  void Init(HttpExchange& exchange) {
+  void Init(const Caller& caller, HttpExchange& exchange) {
+    const absl::Status may = services_.gate->Check(caller, {.action = Action::kCreate, .deed = "POST /task/new/init"});
+    if (!may.ok()) return Refuse(exchange, may);
     const std::string set_uuid = exchange.request.headers.Get("set-uuid");
-    TakeForm(exchange, nullptr, [this, set_uuid](FormBody& form, HttpResponse& response) {
+    TakeForm(exchange, nullptr, [this, caller, set_uuid](FormBody& form, HttpResponse& response) {
       auto task = ParseNewTask(form, set_uuid);
-      const auto uuid = task.ok() ? board_->Begin(*task) : task.status();
-      if (!uuid.ok()) return AnswerError(response, uuid.status());
+      const auto uuid = task.ok() ? board_->Begin(caller, *task) : task.status();
+      if (!uuid.ok()) return AnswerError(response, ForGood(uuid.status()));
       Answer(response, {{"uuid", *uuid}});
     });
   }
 
-  void Upload(const std::string& uuid, HttpExchange& exchange) {
-    if (const absl::Status takes = board_->CheckTakesFiles(uuid); !takes.ok()) {
-      AnswerError(exchange.response, takes);
-      return DropBody(exchange);
-    }
+  void Upload(const Caller& caller, const std::string& uuid, HttpExchange& exchange) {
+    absl::Status takes = CheckTask(caller, Action::kChange, "POST /task/new/upload", uuid);
+    if (takes.ok()) takes = board_->CheckTakesFiles(uuid);
+    if (!takes.ok()) return Refuse(exchange, takes);
+    absl::StatusOr<std::unique_ptr<FormAllowance>> allowance = Allow(caller, exchange.request);
+    if (!allowance.ok()) return Refuse(exchange, allowance.status());
     auto incoming = std::make_shared<Incoming>(
-        board_->staging_folder(),
+        board_->staging_folder(), *std::move(allowance),
         [this, uuid](const std::string& name, StagedFile file) { return board_->TakeFile(uuid, name, *file); });
     TakeForm(exchange, incoming, [incoming](FormBody&, HttpResponse& response) {
       if (incoming->count() == 0) return AnswerError(response, absl::InvalidArgumentError("Need at least 1 file."));
@@ -405,7 +504,9 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
     });
   }
 
-  void Commit(const std::string& uuid, HttpExchange& exchange) {
+  void Commit(const Caller& caller, const std::string& uuid, HttpExchange& exchange) {
+    const absl::Status may = CheckTask(caller, Action::kChange, "POST /task/new/commit", uuid);
+    if (!may.ok()) return Refuse(exchange, may);
     const auto commit = [this, uuid](HttpResponse& response) {
       const absl::Status status = board_->Commit(uuid);
       if (!status.ok()) return AnswerError(response, status);
@@ -416,26 +517,30 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
   }
 
   // Fields may come behind the files, and a task needs its fields to begin.
-  void NewTask(HttpExchange& exchange) {
+  void NewTask(const Caller& caller, HttpExchange& exchange) {
+    const absl::Status may = services_.gate->Check(caller, {.action = Action::kCreate, .deed = "POST /task/new"});
+    if (!may.ok()) return Refuse(exchange, may);
+    absl::StatusOr<std::unique_ptr<FormAllowance>> allowance = Allow(caller, exchange.request);
+    if (!allowance.ok()) return Refuse(exchange, allowance.status());
     auto files = std::make_shared<std::vector<std::pair<std::string, StagedFile>>>();
-    auto incoming =
-        std::make_shared<Incoming>(board_->staging_folder(), [files](const std::string& name, StagedFile file) {
-          files->emplace_back(name, std::move(file));
-          return absl::OkStatus();
-        });
+    auto incoming = std::make_shared<Incoming>(board_->staging_folder(), *std::move(allowance),
+                                               [files](const std::string& name, StagedFile file) {
+                                                 files->emplace_back(name, std::move(file));
+                                                 return absl::OkStatus();
+                                               });
     const std::string set_uuid = exchange.request.headers.Get("set-uuid");
-    TakeForm(exchange, incoming, [this, files, set_uuid](FormBody& form, HttpResponse& response) {
-      const auto uuid = BeginWithFiles(form, set_uuid, *files);
-      if (!uuid.ok()) return AnswerError(response, uuid.status());
+    TakeForm(exchange, incoming, [this, caller, files, set_uuid](FormBody& form, HttpResponse& response) {
+      const auto uuid = BeginWithFiles(caller, form, set_uuid, *files);
+      if (!uuid.ok()) return AnswerError(response, ForGood(uuid.status()));
       Answer(response, {{"uuid", *uuid}});
     });
   }
 
-  absl::StatusOr<std::string> BeginWithFiles(const FormBody& form, const std::string& set_uuid,
+  absl::StatusOr<std::string> BeginWithFiles(const Caller& caller, const FormBody& form, const std::string& set_uuid,
                                              std::vector<std::pair<std::string, StagedFile>>& files) {
     MW_ASSIGN_OR_RETURN(const NewOdmTask task, ParseNewTask(form, set_uuid));
     if (files.empty()) return absl::InvalidArgumentError("Need at least 1 file.");
-    MW_ASSIGN_OR_RETURN(std::string uuid, board_->Begin(task));
+    MW_ASSIGN_OR_RETURN(std::string uuid, board_->Begin(caller, task));
     absl::Status taken;
     for (auto& [name, file] : files) taken.Update(board_->TakeFile(uuid, name, *file));
     if (taken.ok()) taken = board_->Commit(uuid);
@@ -444,9 +549,12 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
     return taken;
   }
 
-  void Change(const std::string& what, HttpExchange& exchange) {
-    TakeForm(exchange, nullptr, [this, what](FormBody& form, HttpResponse& response) {
+  void Change(const Caller& caller, const std::string& what, HttpExchange& exchange) {
+    TakeForm(exchange, nullptr, [this, caller, what](FormBody& form, HttpResponse& response) {
       const std::string uuid = form.Field("uuid").value_or("");
+      const absl::Status may = CheckTask(caller, Action::kChange, "POST /task/" + what, uuid);
+      if (absl::IsPermissionDenied(may)) return AnswerError(response, may);
+      if (!may.ok()) return AnswerSuccess(response, may);
       if (what == "cancel") return AnswerSuccess(response, board_->Cancel(uuid));
       if (what == "remove") return AnswerSuccess(response, board_->Remove(uuid));
       AnswerSuccess(response, board_->Restart(uuid, form.Field("options")));
@@ -455,7 +563,6 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
 
   const NodeOdmOptions options_;
   const NodeOdmServices services_;
-  const std::string token_digest_;
   const OdmOptions task_options_;
   std::unique_ptr<TaskBoard> board_;
   std::unique_ptr<HttpServer> server_;

@@ -10,6 +10,7 @@
 #include "common/base/clock.h"
 #include "common/blob/blob_store.h"
 #include "coordinator/api/reconstruction_service.h"
+#include "coordinator/auth/gatekeeper.h"
 #include "coordinator/dispatch/worker_service.h"
 #include "coordinator/nodeodm/result_package.h"
 
@@ -18,7 +19,6 @@ namespace meshwright {
 struct NodeOdmOptions {
   std::string listen;                     // "host:port"; port 0 takes a free one
   std::string folder;                     // tasks and their results
-  std::string token;                      // that callers have to show; "": none
   std::string tls_certificate_file;       // PEM; "": no TLS
   std::string tls_key_file;               // PEM
   std::set<std::string> trusted_proxies;  // addresses whose X-Forwarded-For is believed
@@ -31,6 +31,7 @@ struct NodeOdmServices {
   ReconstructionService* reconstructions = nullptr;
   WorkerService* workers = nullptr;
   BlobStore* blobs = nullptr;
+  Gatekeeper* gate = nullptr;
   const Clock* clock = nullptr;
   std::string options_json;  // the answer of GET /v1/options
   WriteTexturedGlb write_textured_glb;

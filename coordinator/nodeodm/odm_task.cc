@@ -31,7 +31,7 @@ bool IsUuid(const std::string& text) {
   return true;
 }
 
-// Whoever knows one may do with the task what he likes, so that it has to be hard to guess.
+// Where nobody shows a key, whoever knows one may do with the task what he likes, so that it has to be hard to guess.
 std::string DrawUuid() {
   unsigned char bytes[16];
   MW_CHECK(RAND_bytes(bytes, sizeof(bytes)) == 1);
@@ -44,6 +44,8 @@ std::string DrawUuid() {
   }
   return text;
 }
+
+absl::Status NoSuchTask() { return absl::NotFoundError("Invalid uuid (not found)"); }
 
 std::string ReconstructionOf(const OdmTask& task) {
   return task.run == 0 ? task.uuid : absl::StrCat(task.uuid, "-", task.run);
@@ -58,6 +60,7 @@ std::string EncodeTask(const OdmTask& task) {
   return Dump({{"uuid", task.uuid},
                {"run", task.run},
                {"name", task.name},
+               {"owner", task.owner},
                {"options", task.options},
                {"outputs", task.outputs},
                {"webhook", task.webhook},
@@ -81,6 +84,7 @@ absl::StatusOr<OdmTask> DecodeTask(const std::string& text) {
     OdmTask task = {.uuid = json->at("uuid"),
                     .run = json->at("run"),
                     .name = json->at("name"),
+                    .owner = json->value("owner", ""),  // earlier programs knew none
                     .options = json->at("options"),
                     .outputs = json->at("outputs"),
                     .webhook = json->at("webhook"),

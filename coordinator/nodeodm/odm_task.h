@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include <absl/status/status.h>
 #include <absl/status/statusor.h>
 #include <nlohmann/json.hpp>
 
@@ -17,6 +18,7 @@ struct OdmTask {
   std::string uuid;
   int run = 0;  // grows when it is restarted
   std::string name;
+  std::string owner;  // the user whose key it was begun with; "": nobody's in particular
   nlohmann::ordered_json options = nlohmann::ordered_json::array();  // as they came
   std::vector<std::string> outputs;                                  // paths of all.zip that are wanted; none: all
   std::string webhook;
@@ -37,6 +39,9 @@ struct OdmTask {
 // "dc1a4b08-....": lower case, 8-4-4-4-12.
 bool IsUuid(const std::string& text);
 std::string DrawUuid();
+
+// What is said of a task that is not there, or of somebody else's.
+absl::Status NoSuchTask();
 
 // The reconstruction of its run: the first one is called like the task.
 std::string ReconstructionOf(const OdmTask& task);

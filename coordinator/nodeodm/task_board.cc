@@ -16,6 +16,7 @@
 #include "common/base/version.h"
 #include "common/image/decode.h"
 #include "common/json/json_text.h"
+#include "coordinator/api/guarded_calls.h"
 #include "coordinator/nodeodm/odm_files.h"
 
 namespace meshwright {
@@ -38,8 +39,6 @@ constexpr char kCamerasNeeded[] =
     "Photographs alone need a worker with COLMAP, and none is connected. Start one, or send the model of the cameras among "
     "the images, e.g. COLMAP's cameras.txt, images.txt and points3D.txt (or .bin), Middlebury's _par.txt or Strecha's "
     ".camera files; photographs are matched by their names";
-
-absl::Status Unknown() { return absl::NotFoundError("Invalid uuid (not found)"); }
 
 }  // namespace
 
@@ -102,7 +101,7 @@ absl::Status TaskBoard::Update(const std::string& uuid, const Change& change) {
   {
     const MutexLock lock(mutex_);
     const auto found = tasks_.find(uuid);
-    if (found == tasks_.end()) return Unknown();
+    if (found == tasks_.end()) return NoSuchTask();
     change(found->second.task, lines);
     now = found->second.task;
     found->second.output.insert(found->second.output.end(), lines.begin(), lines.end());
@@ -118,17 +117,23 @@ absl::Status TaskBoard::Update(const std::string& uuid, const Change& change) {
 absl::StatusOr<OdmTask> TaskBoard::Find(const std::string& uuid) const {
   const MutexLock lock(mutex_);
   const auto found = tasks_.find(uuid);
-  if (found == tasks_.end()) return Unknown();
+  if (found == tasks_.end()) return NoSuchTask();
   return found->second.task;
 }
 
-absl::StatusOr<std::string> TaskBoard::Begin(const NewOdmTask& wanted) {
+absl::StatusOr<std::string> TaskBoard::OwnerOf(const std::string& uuid) const {
+  MW_ASSIGN_OR_RETURN(const OdmTask task, Find(uuid));
+  return task.owner;
+}
+
+absl::StatusOr<std::string> TaskBoard::Begin(const Caller& caller, const NewOdmTask& wanted) {
   if (!wanted.uuid.empty() && !IsUuid(wanted.uuid)) {
     return absl::InvalidArgumentError(absl::StrCat("Invalid set-uuid: ", wanted.uuid.substr(0, 64)));
   }
   MW_ASSIGN_OR_RETURN(const OdmTaskOptions options, services_.options->Parse(wanted.options));
   OdmTask task = {.uuid = wanted.uuid.empty() ? DrawUuid() : wanted.uuid,
                   .name = wanted.name,
+                  .owner = caller.user,
                   .options = options.given,
                   .outputs = wanted.outputs,
                   .webhook = wanted.webhook,
@@ -140,7 +145,7 @@ absl::StatusOr<std::string> TaskBoard::Begin(const NewOdmTask& wanted) {
   v1::CreateReconstructionRequest request;
   request.set_id(task.uuid);
   request.set_options_json(OwnOptionsJson(options, /*longest_side_px=*/0));
-  const auto created = services_.reconstructions->Create(request);
+  const auto created = CreateFor(caller, *services_.gate, *services_.reconstructions, request);
   if (absl::IsAlreadyExists(created.status())) {
     return absl::InvalidArgumentError(absl::StrCat("Invalid set-uuid: ", task.uuid, " is in use"));
   }
@@ -163,7 +168,7 @@ absl::StatusOr<std::string> TaskBoard::Begin(const NewOdmTask& wanted) {
 absl::Status TaskBoard::CheckTakesFiles(const std::string& uuid) const {
   const MutexLock lock(mutex_);
   const auto found = tasks_.find(uuid);
-  return found != tasks_.end() && !found->second.task.is_committed ? absl::OkStatus() : Unknown();
+  return found != tasks_.end() && !found->second.task.is_committed ? absl::OkStatus() : NoSuchTask();
 }
 
 absl::Status TaskBoard::LearnFiles(const std::string& uuid) {
@@ -172,7 +177,7 @@ absl::Status TaskBoard::LearnFiles(const std::string& uuid) {
                       services_.reconstructions->ListSceneFiles(ReconstructionOf(task)));
   const MutexLock lock(mutex_);
   const auto found = tasks_.find(uuid);
-  if (found == tasks_.end()) return Unknown();
+  if (found == tasks_.end()) return NoSuchTask();
   for (const SceneFile& file : files) found->second.files.emplace(file.path, file.digest);
   found->second.knows_files = true;
   return absl::OkStatus();
@@ -192,7 +197,7 @@ absl::Status TaskBoard::TakeFile(const std::string& uuid, const std::string& fil
   {
     const MutexLock lock(mutex_);
     const auto found = tasks_.find(uuid);
-    if (found == tasks_.end()) return Unknown();
+    if (found == tasks_.end()) return NoSuchTask();
     knows_files = found->second.knows_files;
     if (kind == OdmFileKind::kUnused && !found->second.unused_files.insert(name).second) return absl::OkStatus();
   }
@@ -205,7 +210,7 @@ absl::Status TaskBoard::TakeFile(const std::string& uuid, const std::string& fil
   {
     const MutexLock lock(mutex_);
     const auto found = tasks_.find(uuid);
-    if (found == tasks_.end()) return Unknown();
+    if (found == tasks_.end()) return NoSuchTask();
     std::map<std::string, std::string>& files = found->second.files;
     for (auto same = files.find(name); same != files.end() && same->second != digest; same = files.find(name)) {
       name = OtherName(name);
@@ -250,12 +255,13 @@ absl::Status TaskBoard::Commit(const std::string& uuid) {
   return absl::OkStatus();
 }
 
-std::vector<std::string> TaskBoard::List() const {
+std::vector<std::string> TaskBoard::List(const Caller& caller) const {
   std::vector<std::pair<int64_t, std::string>> all;
   {
     const MutexLock lock(mutex_);
     for (const auto& [uuid, entry] : tasks_) {
-      if (entry.task.is_committed) all.emplace_back(entry.task.created_ms, uuid);
+      if (!entry.task.is_committed || !MaySee(caller, uuid, entry.task.owner)) continue;
+      all.emplace_back(entry.task.created_ms, uuid);
     }
   }
   std::sort(all.begin(), all.end());
@@ -266,14 +272,14 @@ std::vector<std::string> TaskBoard::List() const {
 
 absl::StatusOr<OdmTask> TaskBoard::Get(const std::string& uuid) const {
   MW_ASSIGN_OR_RETURN(OdmTask task, Find(uuid));
-  if (!task.is_committed) return Unknown();
+  if (!task.is_committed) return NoSuchTask();
   return task;
 }
 
 absl::StatusOr<std::vector<std::string>> TaskBoard::Output(const std::string& uuid, size_t line) const {
   const MutexLock lock(mutex_);
   const auto found = tasks_.find(uuid);
-  if (found == tasks_.end() || !found->second.task.is_committed) return Unknown();
+  if (found == tasks_.end() || !found->second.task.is_committed) return NoSuchTask();
   const std::vector<std::string>& output = found->second.output;
   return std::vector<std::string>(output.begin() + static_cast<ptrdiff_t>(std::min(line, output.size())), output.end());
 }
@@ -329,7 +335,7 @@ absl::Status TaskBoard::Again(const OdmTask& from, OdmTask& to, const OdmTaskOpt
   v1::CreateReconstructionRequest request;
   request.set_id(ReconstructionOf(to));
   request.set_options_json(OwnOptionsJson(options, from.longest_side_px));
-  return services_.reconstructions->CreateAgain(ReconstructionOf(from), request).status();
+  return services_.reconstructions->CreateAgain(ReconstructionOf(from), request, from.owner).status();
 }
 
 absl::Status TaskBoard::Restart(const std::string& uuid, const std::optional<std::string>& given) {
@@ -343,7 +349,7 @@ absl::Status TaskBoard::Restart(const std::string& uuid, const std::optional<std
     const MutexLock disk_lock(disk_mutex_);
     const MutexLock lock(mutex_);
     const auto found = tasks_.find(uuid);
-    if (found == tasks_.end()) return Unknown();
+    if (found == tasks_.end()) return NoSuchTask();
     found->second.output.clear();
     fs::remove(PathOf(uuid, kOutputEnding), error);
     fs::remove_all(ResultFolder(uuid), error);

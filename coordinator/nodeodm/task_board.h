@@ -19,6 +19,7 @@
 #include "common/base/mutex.h"
 #include "common/blob/staged_blob.h"
 #include "coordinator/api/reconstruction_service.h"
+#include "coordinator/auth/gatekeeper.h"
 #include "coordinator/nodeodm/odm_options.h"
 #include "coordinator/nodeodm/odm_task.h"
 #include "coordinator/nodeodm/result_package.h"
@@ -46,6 +47,7 @@ class TaskBoard {
  public:
   struct Services {
     ReconstructionService* reconstructions = nullptr;
+    Gatekeeper* gate = nullptr;
     BlobStore* blobs = nullptr;
     const OdmOptions* options = nullptr;
     const Clock* clock = nullptr;
@@ -59,8 +61,10 @@ class TaskBoard {
   static absl::StatusOr<std::unique_ptr<TaskBoard>> Open(const std::string& folder, const Services& services);
   ~TaskBoard();
 
-  // Returns the UUID.
-  absl::StatusOr<std::string> Begin(const NewOdmTask& task);
+  // The caller's own, if that is within the quota of reconstructions. Returns the UUID.
+  absl::StatusOr<std::string> Begin(const Caller& caller, const NewOdmTask& task);
+  // Whose it is, committed or not.
+  absl::StatusOr<std::string> OwnerOf(const std::string& uuid) const;
   // Whether files may be sent to it. NotFound otherwise.
   absl::Status CheckTakesFiles(const std::string& uuid) const;
   // A file among its images, whole, which is taken away. The same bytes under the same name are the same file; other
@@ -70,7 +74,7 @@ class TaskBoard {
   // No more files: it is a task from now on. Repeating it is harmless.
   absl::Status Commit(const std::string& uuid);
 
-  std::vector<std::string> List() const;  // of those committed, the oldest first
+  std::vector<std::string> List(const Caller& caller) const;  // that it may see, of those committed; the oldest first
   absl::StatusOr<OdmTask> Get(const std::string& uuid) const;
   // Lines from number `line` on.
   absl::StatusOr<std::vector<std::string>> Output(const std::string& uuid, size_t line) const;

@@ -11,8 +11,8 @@
 #include <absl/strings/str_split.h>
 #include <absl/strings/strip.h>
 
-#include "common/base/host_port.h"
 #include "common/base/status_macros.h"
+#include "common/http_server/foreign_requests.h"
 #include "common/http_server/http_server.h"
 #include "coordinator/rest/problem.h"
 #include "coordinator/rest/routes.h"
@@ -45,27 +45,6 @@ ShownKey KeyOf(const HttpRequest& request) {
     }
   }
   return {};
-}
-
-bool OnlyReads(const HttpRequest& request) { return request.method == "GET" || request.method == "HEAD"; }
-
-// Whether the request is another site's doing, in the browser of somebody who can reach this one.
-bool IsForeign(const HttpRequest& request) {
-  if (OnlyReads(request)) return false;
-  const std::string origin = request.headers.Get("Origin");
-  const size_t host = origin.find("://");
-  return !origin.empty() && (host == std::string::npos || origin.substr(host + 3) != request.headers.Get("Host"));
-}
-
-// Whether the request came by a name of the Internet's that somebody lets mean this machine (DNS rebinding). Who
-// listens on the loopback alone has none; behind a proxy the name may be the proxy's.
-bool IsRebound(const HttpRequest& request, const RestOptions& options) {
-  const absl::StatusOr<HostPort> listen = ParseHostPort(options.listen, "listen");
-  if (!options.trusted_proxies.empty() || !listen.ok() || !IsLoopbackHost(listen->host)) return false;
-  const std::string host = request.headers.Get("Host");
-  const std::string name = absl::AsciiStrToLower(host.substr(0, host.find(':')));
-  const bool is_address = host.find_first_not_of("0123456789.:") == std::string::npos || absl::StartsWith(host, "[");
-  return !is_address && absl::StrContains(name, '.') && !absl::EndsWith(name, ".localhost");
 }
 
 // What a route is for, of those that are about somebody's reconstructions or the service; nothing for those that any
@@ -154,7 +133,7 @@ class RealRestServer final : public RestServer, private HttpHandler {
   absl::Status Answer(RestCall& call) {
     const HttpRequest& request = call.request;
     const bool for_interface = request.path == "/v1" || absl::StartsWith(request.path, "/v1/");
-    if (IsRebound(request, options_)) {
+    if (IsRebound(request, options_.listen, options_.trusted_proxies)) {
       return FieldError("Host", absl::PermissionDeniedError("Host is no name of this machine, expected localhost"));
     }
     if (for_interface) MW_RETURN_IF_ERROR(Identify(call));

@@ -52,11 +52,18 @@ class Node:
         with open(self.folder / "log", "a") as log:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, env=environment(), text=True)
         for line in self.process.stdout:
+            if found := re.match(r"listening on port (\d+)", line):
+                self.grpc = f"127.0.0.1:{found[1]}"
             if found := re.search(r"NodeODM on port (\d+)", line):
                 self._address = f"127.0.0.1:{found[1]}"
                 self.url = f"http://{self._address}"
                 return
         raise RuntimeError((self.folder / "log").read_text())
+
+    def key_of(self, user):
+        command = [PROGRAM, "token", "create", "--user", user, "--role", "submitter", "--coordinator", self.grpc]
+        command += ["--token-file", str(self.folder / "token")]
+        return subprocess.run(command, check=True, env=environment(), stdout=subprocess.PIPE, text=True).stdout.strip()
 
     def end(self, kill=False):
         self.process.kill() if kill else self.process.terminate()
@@ -257,6 +264,19 @@ class Conformance(unittest.TestCase):
         self.assertEqual((answer["loginUrl"], answer["registerUrl"]), (None, None))
         self.assertEqual(self.pyodm().get("/info", {"_debugUnauthorized": "1"}).status_code, 401)
         self.refused(lambda: self.pyodm().post_json("/auth/login"), "Not available")
+
+    def test_users_have_keys_and_tasks_of_their_own(self):
+        alice, bob = (PyOdm(self.node.url, self.node.key_of(user)) for user in ("alice", "bob"))
+        uuid = alice.create_task(self.small, OPTIONS, "alice's")
+        self.assertEqual(alice.wait(uuid)["status"], {"code": COMPLETED})
+        self.refused(lambda: bob.info(uuid), "not found")
+        self.refused(lambda: bob.download(uuid), "not found")
+        self.refused(lambda: bob.act("remove", uuid), "not found")
+        self.assertEqual(bob.get_json("/task/list"), [])
+        self.assertTrue(alice.act("restart", uuid))
+        self.assertEqual(alice.wait(uuid)["status"], {"code": COMPLETED})
+        self.assertIn(b"odm_mesh.ply", alice.download(uuid))
+        self.assertTrue(alice.act("remove", uuid))
 
     def test_errors_are_words_with_the_status_200(self):
         client = self.pyodm()
