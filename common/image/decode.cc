@@ -1,15 +1,19 @@
 #include "common/image/decode.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <utility>
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
 #include "common/base/files.h"
+#include "common/base/mutex.h"
 #include "common/base/status_macros.h"
 #include "common/image/codecs.h"
+#include "common/image/resize.h"
 
 namespace meshwright {
 namespace {
@@ -18,10 +22,12 @@ struct Codec {
   bool (*looks_like)(const std::string& bytes);
   absl::StatusOr<ImageSize> (*size)(const std::string& bytes);
   absl::StatusOr<ColorImage> (*decode)(const std::string& bytes);
+  absl::Status (*decode_rows)(const std::string& bytes, int min_width, RowSink& sink);
 };
 
-constexpr Codec kCodecs[] = {
-    {LooksLikeJpeg, JpegSize, DecodeJpeg}, {LooksLikePng, PngSize, DecodePng}, {LooksLikePnm, PnmSize, DecodePnm}};
+constexpr Codec kCodecs[] = {{LooksLikeJpeg, JpegSize, DecodeJpeg, DecodeJpegRows},
+                             {LooksLikePng, PngSize, DecodePng, DecodePngRows},
+                             {LooksLikePnm, PnmSize, DecodePnm, DecodePnmRows}};
 
 absl::Status Named(const std::string& name, const absl::Status& status) {
   return absl::Status(status.code(), absl::StrCat(name, ": ", std::string(status.message())));
@@ -69,6 +75,29 @@ absl::Status CheckRegularFile(const std::string& path) {
   return absl::OkStatus();
 }
 
+// Reduces rows to `width` columns at most.
+class ReducingSink final : public RowSink {
+ public:
+  explicit ReducingSink(int width) : width_(width) {}
+  void Begin(ImageSize size) override {
+    const int columns = std::min(width_, size.width);
+    const auto rows = static_cast<int>(int64_t{size.height} * columns / size.width);
+    reducer_.emplace(size.width, size.height, columns, std::max(1, rows));
+  }
+  void Row(const uint8_t* rgb) override { reducer_->AddRow(rgb); }
+  ColorImage Take() { return reducer_->Take(); }
+
+ private:
+  const int width_;
+  std::optional<AreaReducer> reducer_;
+};
+
+// Nobody makes a server keep many pictures, or take all of its cores, by asking for many at once.
+Mutex& OneAtATime() {
+  static Mutex mutex;
+  return mutex;
+}
+
 }  // namespace
 
 absl::StatusOr<ImageSize> ReadImageSize(const std::string& path) {
@@ -92,6 +121,21 @@ absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std:
     MW_ASSIGN_OR_RETURN(const ImageSize size, CheckedSize(*codec, bytes));
     MW_RETURN_IF_ERROR(CheckPlausible(size, bytes.size()));
     return codec->decode(bytes);
+  };
+  absl::StatusOr<ColorImage> image = decode();
+  if (!image.ok()) return Named(name, image.status());
+  return image;
+}
+
+absl::StatusOr<ColorImage> DecodeReduced(const std::string& bytes, const std::string& name, int width) {
+  const auto decode = [&]() -> absl::StatusOr<ColorImage> {
+    MW_ASSIGN_OR_RETURN(const Codec* codec, FindCodec(bytes));
+    MW_ASSIGN_OR_RETURN(const ImageSize size, CheckedSize(*codec, bytes));
+    MW_RETURN_IF_ERROR(CheckPlausible(size, bytes.size()));
+    const MutexLock lock(OneAtATime());
+    ReducingSink sink(width);
+    MW_RETURN_IF_ERROR(codec->decode_rows(bytes, width, sink));
+    return sink.Take();
   };
   absl::StatusOr<ColorImage> image = decode();
   if (!image.ok()) return Named(name, image.status());

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 // jpeglib.h needs <cstdio> before it.
@@ -14,6 +15,7 @@
 #include "common/base/files.h"
 #include "common/base/temporary_folder_testing.h"
 #include "common/image/encode.h"
+#include "common/image/resize.h"
 
 namespace meshwright {
 namespace {
@@ -247,6 +249,57 @@ TEST(DecodeImageBytes, HugePicturesAreRefusedFromTheHeader) {
   // Within the limit, but not out of so few bytes.
   png.replace(16, 8, std::string("\0\0\x40\0\0\0\x40\0", 8));
   EXPECT_THAT(std::string(DecodeImageBytes(png, "huge.png").status().message()), HasSubstr("16384 x 16384 px out of"));
+}
+
+TEST(DecodeReduced, IsTheMeanOverTheWholePicture) {
+  const ColorImage image = Picture(500, 300);
+  const std::vector<uint8_t> samples(image.rgb);
+  for (const std::string& bytes :
+       {EncodePng(image), OtherPng(500, 300, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_ADAM7, samples),
+        absl::StrCat("P6 500 300 255\n", std::string(samples.begin(), samples.end()))}) {
+    const absl::StatusOr<ColorImage> reduced = DecodeReduced(bytes, "x", 200);
+    ASSERT_TRUE(reduced.ok()) << reduced.status();
+    EXPECT_EQ(reduced->rgb, ReduceByArea(image, 200, 120).rgb);
+    EXPECT_EQ(DecodeReduced(bytes, "x", 1000)->rgb, image.rgb);
+  }
+  // A JPEG may be made smaller while it is decoded: nearly the same.
+  for (const bool progressive : {false, true}) {
+    const std::string bytes = OtherJpeg(image, progressive, false, 0);
+    const ColorImage whole = ReduceByArea(*DecodeImageBytes(bytes, "x"), 100, 60);
+    const absl::StatusOr<ColorImage> reduced = DecodeReduced(bytes, "x", 100);
+    ASSERT_TRUE(reduced.ok()) << reduced.status();
+    ASSERT_EQ(std::pair(reduced->width, reduced->height), std::pair(100, 60));
+    for (size_t i = 0; i < whole.rgb.size(); ++i) ASSERT_NEAR(reduced->rgb[i], whole.rgb[i], 6);
+  }
+}
+
+TEST(DecodeReduced, WhatCannotBeReadByRowsMayNotBeLarge) {
+  const ColorImage large = {.width = 5000, .height = 4000, .rgb = std::vector<uint8_t>(60'000'000, 200)};
+  EXPECT_TRUE(DecodeReduced(OtherJpeg(large, false, false, 0), "x", 64).ok());
+  const absl::Status jpeg = DecodeReduced(OtherJpeg(large, true, false, 0), "x.jpg", 64).status();
+  EXPECT_THAT(std::string(jpeg.message()), HasSubstr("x.jpg: progressive JPEG of 5000 x 4000 px"));
+  const std::string interlaced = OtherPng(5000, 4000, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_ADAM7, large.rgb);
+  EXPECT_THAT(DecodeReduced(interlaced, "x.png", 64).status().ToString(), HasSubstr("interlaced PNG of 5000 x 4000"));
+}
+
+TEST(DecodeReduced, DamageIsAnErrorThere) {
+  const std::string png = EncodePng(Picture(300, 200));
+  const std::string jpeg = EncodeJpeg(Picture(300, 200), 90);
+  for (const std::string& bytes : {png.substr(0, png.size() / 2), jpeg.substr(0, jpeg.size() / 2)}) {
+    EXPECT_EQ(DecodeReduced(bytes, "cut.img", 64).status().code(), absl::StatusCode::kInvalidArgument);
+  }
+}
+
+// A scan is some bytes that make the decoder go over the whole picture.
+TEST(DecodeImageBytes, AJpegOfHundredsOfScansIsRefused) {
+  std::string bytes = OtherJpeg(Picture(64, 64), /*progressive=*/true, /*grey=*/true, 0);
+  const size_t last = bytes.rfind(std::string("\xFF\xDA", 2));
+  const size_t end = bytes.rfind(std::string("\xFF\xD9", 2));
+  ASSERT_TRUE(last != std::string::npos && end != std::string::npos);
+  const std::string scan = bytes.substr(last, end - last);
+  for (int i = 0; i < 200; ++i) bytes.insert(end, scan);
+  EXPECT_THAT(DecodeImageBytes(bytes, "x.jpg").status().ToString(), HasSubstr("scans of 64 x 64 pixels"));
+  EXPECT_FALSE(DecodeReduced(bytes, "x.jpg", 16).ok());
 }
 
 TEST(DecodeImageBytes, SaysWhatIsWrongWithTheFile) {

@@ -9,6 +9,7 @@
 #include <jpeglib.h>
 
 #include "common/base/check.h"
+#include "common/base/status_macros.h"
 #include "common/image/codecs.h"
 #include "common/image/encode.h"
 
@@ -58,6 +59,22 @@ bool ReadHeader(const std::string& bytes, jpeg_decompress_struct* info, ErrorMan
   return true;
 }
 
+// A scan of a progressive JPEG goes over the whole picture and may be a few bytes: files of kilobytes could ask for
+// minutes. Cameras and programs write ten or so.
+constexpr int kMaxScans = 100;
+constexpr int64_t kMaxScannedPixels = int64_t{1} << 32;
+
+void CheckScans(j_common_ptr info) {
+  const auto* const decompress = reinterpret_cast<const jpeg_decompress_struct*>(info);
+  const int64_t pixels = int64_t{decompress->image_width} * decompress->image_height;
+  const int scans = decompress->input_scan_number;
+  if (scans <= 1 || (scans <= kMaxScans && scans * pixels <= kMaxScannedPixels)) return;
+  auto* manager = reinterpret_cast<ErrorManager*>(info->err);
+  std::snprintf(manager->message, sizeof(manager->message), "more than %d scans of %u x %u pixels", scans - 1,
+                decompress->image_width, decompress->image_height);
+  std::longjmp(manager->jump, 1);
+}
+
 bool ReadPixels(jpeg_decompress_struct* info, ErrorManager* errors, ColorImage* image) {
   if (setjmp(errors->jump) != 0) return false;
   info->out_color_space = JCS_RGB;
@@ -71,6 +88,28 @@ bool ReadPixels(jpeg_decompress_struct* info, ErrorManager* errors, ColorImage* 
     jpeg_read_scanlines(info, &row, 1);
   }
   jpeg_finish_decompress(info);  // reads on to the end marker
+  return true;
+}
+
+bool ReadRows(jpeg_decompress_struct* info, ErrorManager* errors, int min_width, RowSink* sink) {
+  if (setjmp(errors->jump) != 0) return false;
+  info->out_color_space = JCS_RGB;
+  info->dct_method = JDCT_ISLOW;
+  info->mem->max_memory_to_use = kMaxKeptBytes;
+  info->scale_denom = 8;
+  for (; info->scale_denom > 1; info->scale_denom /= 2) {
+    info->scale_num = 1;
+    jpeg_calc_output_dimensions(info);
+    if (static_cast<int>(info->output_width) >= min_width) break;
+  }
+  jpeg_start_decompress(info);
+  sink->Begin({static_cast<int>(info->output_width), static_cast<int>(info->output_height)});
+  JSAMPARRAY rows =
+      info->mem->alloc_sarray(reinterpret_cast<j_common_ptr>(info), JPOOL_IMAGE, 3 * info->output_width, 1);
+  while (info->output_scanline < info->output_height) {
+    if (jpeg_read_scanlines(info, rows, 1) == 1) sink->Row(rows[0]);
+  }
+  jpeg_finish_decompress(info);
   return true;
 }
 
@@ -102,6 +141,29 @@ absl::Status Damaged(const ErrorManager& errors) {
       absl::StrCat("truncated or damaged JPEG (", errors.message, "); expected a whole picture"));
 }
 
+// `read(info, errors)` after the header; false when it has left with an error.
+template <typename Read>
+absl::Status Decode(const std::string& bytes, const Read& read) {
+  ErrorManager errors{};
+  jpeg_decompress_struct info{};
+  info.err = &errors.first;
+  SetUpErrors(&errors);
+  jpeg_progress_mgr progress{};
+  progress.progress_monitor = CheckScans;
+  ImageSize size;
+  bool ok = ReadHeader(bytes, &info, &errors, &size);
+  info.progress = &progress;
+  const bool four_channels = ok && info.num_components == 4;
+  ok = ok && !four_channels && read(&info, &errors);
+  jpeg_destroy_decompress(&info);
+  if (four_channels) return absl::InvalidArgumentError("CMYK JPEG; expected grey or RGB colour");
+  if (!ok && errors.first.msg_code == JERR_NO_BACKING_STORE) {
+    return absl::InvalidArgumentError(absl::StrCat("progressive JPEG of ", size.width, " x ", size.height,
+                                                   " px; expected fewer, or a baseline JPEG"));
+  }
+  return ok ? absl::OkStatus() : Damaged(errors);
+}
+
 }  // namespace
 
 bool LooksLikeJpeg(const std::string& bytes) { return bytes.compare(0, 3, "\xFF\xD8\xFF") == 0; }
@@ -119,19 +181,16 @@ absl::StatusOr<ImageSize> JpegSize(const std::string& bytes) {
 }
 
 absl::StatusOr<ColorImage> DecodeJpeg(const std::string& bytes) {
-  ErrorManager errors{};
-  jpeg_decompress_struct info{};
-  info.err = &errors.first;
-  SetUpErrors(&errors);
-  ImageSize size;
   ColorImage image;
-  bool ok = ReadHeader(bytes, &info, &errors, &size);
-  const bool four_channels = ok && info.num_components == 4;
-  ok = ok && !four_channels && ReadPixels(&info, &errors, &image);
-  jpeg_destroy_decompress(&info);
-  if (four_channels) return absl::InvalidArgumentError("CMYK JPEG; expected grey or RGB colour");
-  if (!ok) return Damaged(errors);
+  MW_RETURN_IF_ERROR(Decode(
+      bytes, [&](jpeg_decompress_struct* info, ErrorManager* errors) { return ReadPixels(info, errors, &image); }));
   return image;
+}
+
+absl::Status DecodeJpegRows(const std::string& bytes, int min_width, RowSink& sink) {
+  return Decode(bytes, [&](jpeg_decompress_struct* info, ErrorManager* errors) {
+    return ReadRows(info, errors, min_width, &sink);
+  });
 }
 
 std::string EncodeJpeg(const ColorImage& image, int quality) {

@@ -1,12 +1,14 @@
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
+#include <vector>
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <png.h>
 
 #include "common/base/check.h"
+#include "common/base/status_macros.h"
 #include "common/image/codecs.h"
 #include "common/image/encode.h"
 
@@ -56,23 +58,43 @@ bool ReadHeader(png_structp png, png_infop info, Source* source, ErrorState* err
   return true;
 }
 
-bool ReadPixels(png_structp png, png_infop info, ErrorState* errors, ColorImage* image) {
-  if (setjmp(errors->jump) != 0) return false;
+// To 8-bit RGB. Returns in how many passes over all rows. Leaves by png's jump.
+int SetUpRgb(png_structp png, png_infop info) {
   png_set_expand(png);  // palettes to colours, 1, 2 and 4 bits to 8
   png_set_scale_16(png);
   png_set_gray_to_rgb(png);
   png_set_strip_alpha(png);
   const int passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);
+  if (png_get_rowbytes(png, info) != size_t{3} * png_get_image_width(png, info)) png_error(png, "unexpected row size");
+  return passes;
+}
+
+bool ReadPixels(png_structp png, png_infop info, ErrorState* errors, ColorImage* image) {
+  if (setjmp(errors->jump) != 0) return false;
+  const int passes = SetUpRgb(png, info);
   image->width = static_cast<int>(png_get_image_width(png, info));
   image->height = static_cast<int>(png_get_image_height(png, info));
   const size_t row_bytes = size_t{3} * png_get_image_width(png, info);
-  if (png_get_rowbytes(png, info) != row_bytes) png_error(png, "unexpected row size");
   image->rgb.assign(row_bytes * png_get_image_height(png, info), 0);
   for (int pass = 0; pass < passes; ++pass) {
     for (int y = 0; y < image->height; ++y) {
       png_read_row(png, image->rgb.data() + row_bytes * static_cast<size_t>(y), nullptr);
     }
+  }
+  png_read_end(png, nullptr);
+  return true;
+}
+
+// `row`: room for one.
+bool ReadRows(png_structp png, png_infop info, ErrorState* errors, uint8_t* row, RowSink* sink) {
+  if (setjmp(errors->jump) != 0) return false;
+  SetUpRgb(png, info);
+  const png_uint_32 height = png_get_image_height(png, info);
+  sink->Begin({static_cast<int>(png_get_image_width(png, info)), static_cast<int>(height)});
+  for (png_uint_32 y = 0; y < height; ++y) {
+    png_read_row(png, row, nullptr);
+    sink->Row(row);
   }
   png_read_end(png, nullptr);
   return true;
@@ -95,6 +117,21 @@ bool WritePixels(const ColorImage& image, png_structp png, png_infop info, Error
 absl::Status Damaged(const ErrorState& errors) {
   return absl::InvalidArgumentError(
       absl::StrCat("truncated or damaged PNG (", errors.message, "); expected a whole picture"));
+}
+
+// `read(png, info, errors, size)` after the header; false when it has left with an error.
+template <typename Read>
+absl::Status Decode(const std::string& bytes, const Read& read) {
+  ErrorState errors;
+  Source source{.bytes = &bytes};
+  ImageSize size;
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &errors, LeaveWithError, IgnoreWarning);
+  MW_CHECK(png != nullptr);
+  png_infop info = png_create_info_struct(png);
+  MW_CHECK(info != nullptr);
+  const bool ok = ReadHeader(png, info, &source, &errors, &size) && read(png, info, &errors, size);
+  png_destroy_read_struct(&png, &info, nullptr);
+  return ok ? absl::OkStatus() : Damaged(errors);
 }
 
 }  // namespace
@@ -120,18 +157,33 @@ absl::StatusOr<ImageSize> PngSize(const std::string& bytes) {
 }
 
 absl::StatusOr<ColorImage> DecodePng(const std::string& bytes) {
-  ErrorState errors;
-  Source source{.bytes = &bytes};
-  ImageSize size;
   ColorImage image;
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &errors, LeaveWithError, IgnoreWarning);
-  MW_CHECK(png != nullptr);
-  png_infop info = png_create_info_struct(png);
-  MW_CHECK(info != nullptr);
-  const bool ok = ReadHeader(png, info, &source, &errors, &size) && ReadPixels(png, info, &errors, &image);
-  png_destroy_read_struct(&png, &info, nullptr);
-  if (!ok) return Damaged(errors);
+  MW_RETURN_IF_ERROR(Decode(bytes, [&](png_structp png, png_infop info, ErrorState* errors, ImageSize) {
+    return ReadPixels(png, info, errors, &image);
+  }));
   return image;
+}
+
+absl::Status DecodePngRows(const std::string& bytes, int, RowSink& sink) {
+  // The rows of an interlaced one are whole at the end only.
+  constexpr size_t kInterlaceAt = 28;
+  if (bytes.size() > kInterlaceAt && bytes[kInterlaceAt] != 0) {
+    MW_ASSIGN_OR_RETURN(const ImageSize size, PngSize(bytes));
+    if (int64_t{3} * size.width * size.height > kMaxKeptBytes) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("interlaced PNG of ", size.width, " x ", size.height, " px; expected fewer, or no interlacing"));
+    }
+    MW_ASSIGN_OR_RETURN(const ColorImage image, DecodePng(bytes));
+    sink.Begin({image.width, image.height});
+    const size_t row_bytes = 3 * static_cast<size_t>(image.width);
+    for (size_t y = 0; y < static_cast<size_t>(image.height); ++y) sink.Row(image.rgb.data() + y * row_bytes);
+    return absl::OkStatus();
+  }
+  std::vector<uint8_t> row;
+  return Decode(bytes, [&](png_structp png, png_infop info, ErrorState* errors, ImageSize size) {
+    row.resize(3 * static_cast<size_t>(size.width));
+    return ReadRows(png, info, errors, row.data(), &sink);
+  });
 }
 
 std::string EncodePng(const ColorImage& image) {

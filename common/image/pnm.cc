@@ -92,5 +92,14 @@ absl::StatusOr<ColorImage> DecodePnm(const std::string& bytes) {
   return image;
 }
 
+absl::Status DecodePnmRows(const std::string& bytes, int, RowSink& sink) {
+  MW_ASSIGN_OR_RETURN(const ColorImage image, DecodePnm(bytes));
+  sink.Begin({image.width, image.height});
+  for (int row = 0; row < image.height; ++row) {
+    sink.Row(image.rgb.data() + 3 * static_cast<size_t>(row) * static_cast<size_t>(image.width));
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -7,7 +6,6 @@
 #include "common/base/status_macros.h"
 #include "common/image/decode.h"
 #include "common/image/encode.h"
-#include "common/image/resize.h"
 #include "coordinator/api/scene_upload.h"
 #include "coordinator/rest/json.h"
 #include "coordinator/rest/problem.h"
@@ -95,10 +93,8 @@ absl::Status Photo(const RestContext& context, RestCall& call) {
   const std::string& digest = view.image_path;
   return SendImmutable(call, absl::StrCat(digest, "-", width), "image/jpeg", [&]() -> absl::StatusOr<std::string> {
     MW_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->Get(digest));
-    MW_ASSIGN_OR_RETURN(const ColorImage image, DecodeImageBytes(bytes, view.name));
-    const int columns = std::min(static_cast<int>(width), image.width);
-    const auto rows = static_cast<int>(int64_t{image.height} * columns / image.width);
-    return EncodeJpeg(ReduceByArea(image, columns, std::max(1, rows)), kJpegQuality);
+    MW_ASSIGN_OR_RETURN(const ColorImage image, DecodeReduced(bytes, view.name, static_cast<int>(width)));
+    return EncodeJpeg(image, kJpegQuality);
   });
 }
 
