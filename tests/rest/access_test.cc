@@ -1,6 +1,7 @@
 // Who may what, over real connections: the same keys over HTTP and gRPC, with and without TLS. The rows of the threat
 // table in docs/security.md name these tests.
 
+#include <absl/time/clock.h>
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 
@@ -19,12 +20,14 @@ class AccessOverTheNetworkTest : public AccessCluster {};
 TEST_F(AccessOverTheNetworkTest, WhoShowsNoValidKeyGetsNothing) {
   const std::string alice = Key("alice", v1::ROLE_SUBMITTER);
   ASSERT_EQ(Create("castle", alice), 200);
+  const std::string expired = Key("alice", v1::ROLE_SUBMITTER, 1);
+  absl::SleepFor(absl::Milliseconds(1100));
   const std::string revoked = Key("alice", v1::ROLE_SUBMITTER);
   ASSERT_TRUE(Grpc(kRoot)->RevokeKey(revoked.substr(4, 16)).ok());
   std::string wrong = alice;
   wrong.back() = wrong.back() == '0' ? '1' : '0';
   std::string said;
-  for (const std::string& key : {std::string("x"), std::string(kRoot) + "x", wrong, revoked}) {
+  for (const std::string& key : {std::string("x"), std::string(kRoot) + "x", wrong, expired, revoked}) {
     for (const char* path : {"/v1/reconstructions", "/v1/reconstructions/castle", "/v1/workers", "/v1/options"}) {
       const auto refused = http_->Get(path, Bearer(key));
       EXPECT_EQ(refused->status, 401) << path;
@@ -42,6 +45,48 @@ TEST_F(AccessOverTheNetworkTest, WhoShowsNoValidKeyGetsNothing) {
   EXPECT_EQ(http_->Get("/v1/reconstructions")->status, 401);
   EXPECT_TRUE(absl::IsUnauthenticated(Grpc("")->Get("castle").status()));
   EXPECT_EQ(http_->Get("/healthz")->status, 200);
+}
+
+// Each refusal is counted by what it was, and neither answers, metrics nor the log have anything of a key.
+TEST_F(AccessOverTheNetworkTest, RefusalsAreCountedAndTellNothing) {
+  Stop();
+  settings_.metrics_listen = "127.0.0.1:0";
+  testing::internal::CaptureStderr();
+  Start();
+  const std::string alice = Key("alice", v1::ROLE_SUBMITTER);
+  const std::string viewer = Key("vera", v1::ROLE_VIEWER);
+  const std::string wrong = alice.substr(0, alice.size() - 4) + "0000";
+  const auto metrics = [&] { return httplib::Client("127.0.0.1", coordinator_->metrics_port()).Get("/metrics")->body; };
+  const auto refused = [&](const std::string& code) {
+    const std::string line = "meshwright_calls_refused_total{code=\"" + code + "\"} ";
+    const std::string text = metrics();
+    const size_t at = text.find(line);
+    return at == std::string::npos ? 0 : std::stoi(text.substr(at + line.size()));
+  };
+  ASSERT_EQ(Create("castle", alice), 200);
+  EXPECT_EQ(refused("UNAUTHENTICATED"), 0);
+  std::string said;
+  for (const std::string& key : {std::string(), std::string("guess-of-a-key"), wrong}) {
+    said += http_->Get("/v1/reconstructions", Bearer(key))->body;
+    said += Grpc(key)->Get("castle").status().ToString();
+  }
+  EXPECT_EQ(refused("UNAUTHENTICATED"), 6);
+  said += http_->Delete("/v1/reconstructions/castle", Bearer(viewer))->body;
+  said += Grpc(viewer)->ListWorkers().status().ToString();
+  EXPECT_EQ(refused("PERMISSION_DENIED"), 2);
+  said += http_->Get("/v1/reconstructions/castle", Bearer(viewer))->body;
+  EXPECT_EQ(refused("NOT_FOUND"), 1);
+  said += metrics();
+  Stop();
+  const std::string log = testing::internal::GetCapturedStderr();
+  EXPECT_THAT(log, HasSubstr("UNAUTHENTICATED"));
+  EXPECT_THAT(log, HasSubstr("DELETE /v1/reconstructions/{id}"));
+  for (const std::string& text : {log, said}) {
+    for (const std::string& key : {alice, viewer, wrong, std::string(kRoot), std::string(kJoin)}) {
+      EXPECT_THAT(text, testing::Not(HasSubstr(key.substr(key.size() - 12)))) << key;
+    }
+    EXPECT_THAT(text, testing::Not(HasSubstr("guess-of-a-key")));
+  }
 }
 
 TEST_F(AccessOverTheNetworkTest, TenantsDoNotExistForEachOther) {
