@@ -77,7 +77,7 @@ std::string FilesystemBlobStore::PathOf(const std::string& digest) const {
 absl::Status FilesystemBlobStore::MakeFolderOf(const std::string& path) {
   const std::string shard = fs::path(path).parent_path().string();
   std::error_code error;
-  const bool created = fs::create_directory(shard, error);
+  const bool created = fs::create_directories(shard, error);  // the root too, where somebody has deleted it
   if (error) return SystemError("cannot create a folder of the blob store", shard, error);
   if (created) SyncFolder(root_);
   return absl::OkStatus();

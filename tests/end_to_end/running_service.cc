@@ -12,21 +12,23 @@ std::vector<std::string> With(std::vector<std::string> arguments, const std::vec
   return arguments;
 }
 
-std::unique_ptr<BackgroundProgram> RunningService::StartCoordinator(const std::vector<std::string>& arguments) {
+std::unique_ptr<BackgroundProgram> RunningService::StartCoordinator(const std::vector<std::string>& arguments,
+                                                                    const std::string& program) {
   const std::string log = folder_ / ("coordinator-" + port_ + ".log");
   std::remove(log.c_str());
   std::vector<std::string> all = With({"--listen", "127.0.0.1:" + port_, "--lease-seconds", "2"}, arguments);
   if (std::find(all.begin(), all.end(), "--data") == all.end()) all = With(all, {"--data", folder_ / "data"});
-  auto coordinator = std::make_unique<BackgroundProgram>(MESHWRIGHT_COORDINATOR, all, log);
+  auto coordinator = std::make_unique<BackgroundProgram>(program, all, log);
   port_ = ListeningPort(log);
   return coordinator;
 }
 
 std::unique_ptr<BackgroundProgram> RunningService::StartWorker(const std::string& id,
                                                                const std::vector<std::string>& arguments,
-                                                               const std::string& coordinator) const {
+                                                               const std::string& coordinator,
+                                                               const std::string& program) const {
   return std::make_unique<BackgroundProgram>(
-      MESHWRIGHT_WORKER,
+      program,
       With({"--coordinator", coordinator.empty() ? address() : coordinator, "--worker-id", id, "--cores", "1"},
            arguments),
       folder_ / (id + ".log"));

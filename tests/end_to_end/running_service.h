@@ -21,12 +21,15 @@ class RunningService {
 
   // A coordinator on a free port, at the next start on the same one again, with its state in folder() / "data" unless
   // `arguments` name another place. The clients below speak to the one that was started last.
-  std::unique_ptr<BackgroundProgram> StartCoordinator(const std::vector<std::string>& arguments = {});
+  // `program`: of another version.
+  std::unique_ptr<BackgroundProgram> StartCoordinator(const std::vector<std::string>& arguments = {},
+                                                      const std::string& program = MESHWRIGHT_COORDINATOR);
   // For a second coordinator: the next one gets a port of its own.
   void ForgetPort() { port_ = "0"; }
   // `coordinator`: "": address().
   std::unique_ptr<BackgroundProgram> StartWorker(const std::string& id, const std::vector<std::string>& arguments = {},
-                                                 const std::string& coordinator = "") const;
+                                                 const std::string& coordinator = "",
+                                                 const std::string& program = MESHWRIGHT_WORKER) const;
 
   // `meshwright ARGUMENTS --coordinator address() --quiet`.
   RunResult Client(const std::vector<std::string>& arguments) const;

@@ -3,7 +3,6 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <random>
 #include <string>
@@ -13,13 +12,12 @@
 #include <absl/time/clock.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/mount.h>
 
 #include "common/base/clock.h"
 #include "coordinator/store/postgres_testing.h"
-#include "tests/end_to_end/program.h"
-#include "tests/end_to_end/running_service.h"
 #include "tests/faults/cut_line.h"
+#include "tests/faults/faults_fixture.h"
+#include "tests/faults/small_disk.h"
 
 namespace meshwright::faults {
 namespace {
@@ -27,38 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 using end_to_end::BackgroundProgram;
 using end_to_end::ReadBytes;
-using end_to_end::RunningService;
-using end_to_end::SharedScene;
-using end_to_end::WaitUntil;
 using end_to_end::With;
 using end_to_end::WriteBytes;
-
-const std::vector<std::string> kOptions = {"--lattice-step", "1"};
-
-class FaultsTest : public testing::Test {
- protected:
-  const std::string& scene() const { return SharedScene("turn"); }
-
-  // What all of them have to make.
-  const std::string& Expected() {
-    static const std::string mesh = RunningService().LocalMesh(SharedScene("turn"), kOptions);
-    return mesh;
-  }
-  void Submit() {
-    const auto submitted = service_.Client(With({"submit", scene(), "--id", "turn"}, kOptions));
-    ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
-  }
-  bool Reaches(int commits, double seconds = 120) {
-    return WaitUntil([&] { return service_.Committed("turn") >= commits; }, seconds);
-  }
-  bool IsOver() const {
-    const nlohmann::json status = service_.Status("turn");
-    return status.is_object() && status["state"] == "done";
-  }
-  int port() const { return std::stoi(service_.address().substr(service_.address().find(':') + 1)); }
-
-  RunningService service_;
-};
 
 TEST_F(FaultsTest, AWorkerIsKilledTwentyTimes) {
   const auto coordinator = service_.StartCoordinator();
@@ -193,7 +161,7 @@ TEST_F(FaultsTest, PhotographsRotOnTheDiskThoughTheSceneIsStillThere) {
   const fs::path folder = scene();
   const auto coordinator = service_.StartCoordinator({"--scene-root", folder.parent_path().string()});
   auto worker = service_.StartWorker("worker");
-  const auto submitted = service_.Client(With({"submit", "file:turn", "--id", "turn"}, kOptions));
+  const auto submitted = service_.Client(With({"submit", "file:turn", "--id", "turn"}, options_));
   ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
   ASSERT_TRUE(Reaches(2));
   worker->Stop(SIGKILL);  // with the photographs that it had read
@@ -214,31 +182,6 @@ TEST_F(FaultsTest, UploadedPhotographsThatRotAreNamed) {
   EXPECT_THAT(service_.Status("turn")["failure"].get<std::string>(),
               testing::ContainsRegex("[0-9]+\\.png is damaged or lost"));
 }
-
-// A file system that is full soon.
-class SmallDisk {
- public:
-  explicit SmallDisk(std::string path) : path_(std::move(path)) {
-    fs::create_directories(path_);
-    mounted_ = ::mount("tmpfs", path_.c_str(), "tmpfs", 0, "size=128m") == 0;
-  }
-  ~SmallDisk() {
-    if (mounted_) ::umount2(path_.c_str(), MNT_DETACH);
-  }
-  bool mounted() const { return mounted_; }
-  const std::string& path() const { return path_; }
-  // Leaves less than this. Others may write meanwhile and fill it first, so that a failing write is what is wanted too.
-  void Fill(uintmax_t bytes_left) const {
-    const uintmax_t free = fs::space(path_).available;
-    if (free > bytes_left) std::ofstream(path_ + "/ballast") << std::string(free - bytes_left, 'x');
-    EXPECT_LE(fs::space(path_).available, bytes_left);
-  }
-  void Empty() const { fs::remove(path_ + "/ballast"); }
-
- private:
-  std::string path_;
-  bool mounted_ = false;
-};
 
 TEST_F(FaultsTest, TheCoordinatorsDiskIsFullForAWhile) {
   const SmallDisk disk(service_.folder() / "disk");
