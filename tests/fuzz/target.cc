@@ -8,7 +8,7 @@ namespace meshwright::fuzz {
 const std::vector<Target>& Targets() {
   static const auto* const targets = [] {
     auto* const all = new std::vector<Target>();
-    for (auto some : {SceneTargets(), GeometryTargets(), TextTargets()}) {
+    for (auto some : {SceneTargets(), GeometryTargets(), TextTargets(), ServiceTargets()}) {
       all->insert(all->end(), std::make_move_iterator(some.begin()), std::make_move_iterator(some.end()));
     }
     return all;

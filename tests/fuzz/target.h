@@ -25,6 +25,7 @@ const Target* FindTarget(const std::string& name);
 std::vector<Target> SceneTargets();
 std::vector<Target> GeometryTargets();
 std::vector<Target> TextTargets();
+std::vector<Target> ServiceTargets();
 
 }  // namespace meshwright::fuzz
 // SPDX-License-Identifier: Apache-2.0
