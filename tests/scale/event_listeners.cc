@@ -18,9 +18,16 @@ namespace {
 constexpr int kPollMs = 50;
 constexpr size_t kReadBytes = 64 << 10;
 
-int Connect(const std::string& port) {
+// One caller gets 250 streams: these come from many addresses, as from many browsers.
+constexpr int kStreamsOfOneAddress = 200;
+
+int Connect(const std::string& port, int number) {
   const int connected = ::socket(AF_INET, SOCK_STREAM, 0);
   MW_CHECK(connected >= 0);
+  sockaddr_in own = {};
+  own.sin_family = AF_INET;
+  own.sin_addr.s_addr = htonl(INADDR_LOOPBACK + 256 + static_cast<uint32_t>(number / kStreamsOfOneAddress));
+  MW_CHECK(::bind(connected, reinterpret_cast<sockaddr*>(&own), sizeof(own)) == 0);
   sockaddr_in address = {};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<uint16_t>(std::stoi(port)));
@@ -35,7 +42,7 @@ EventListeners::EventListeners(const std::string& port, const std::string& recon
   const std::string request =
       absl::StrCat("GET /v1/reconstructions/", reconstruction, "/events HTTP/1.1\r\nHost: localhost\r\n\r\n");
   for (int i = 0; i < clients; ++i) {
-    clients_.push_back({.socket = Connect(port)});
+    clients_.push_back({.socket = Connect(port, i)});
     MW_CHECK(::send(clients_.back().socket, request.data(), request.size(), 0) == static_cast<ssize_t>(request.size()));
   }
   thread_ = std::thread([this] { Run(); });

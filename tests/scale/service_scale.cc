@@ -44,10 +44,11 @@ struct Settings {
   int event_streams = 0;  // of the first reconstruction
 };
 
-double PeakMebibytes(pid_t process) {
+// A number of /proc/PROCESS/status.
+double StatusNumber(pid_t process, const std::string& name) {
   std::ifstream status(absl::StrCat("/proc/", process, "/status"));
   for (std::string line; std::getline(status, line);) {
-    if (absl::StartsWith(line.c_str(), "VmHWM:")) return std::stod(line.substr(6)) / 1024;
+    if (absl::StartsWith(line.c_str(), name.c_str())) return std::stod(line.substr(name.size()));
   }
   return 0;
 }
@@ -170,7 +171,8 @@ int Measure(const Settings& settings) {
                              {"parts_read_per_client", static_cast<double>(listeners.parts()) / settings.event_streams},
                              {"bytes_read", listeners.bytes()}};
   }
-  json["coordinator_peak_mib"] = PeakMebibytes(coordinator.id());
+  json["coordinator_threads"] = StatusNumber(coordinator.id(), "Threads:");
+  json["coordinator_peak_mib"] = StatusNumber(coordinator.id(), "VmHWM:") / 1024;
   std::vector<double> small;
   for (const auto& [name, seconds] : ended) {
     if (name != name_of(0)) small.push_back(seconds);
