@@ -46,6 +46,7 @@ void PrintReconstruction(const v1::Reconstruction& reconstruction) {
   }
   if (progress.cameras_skipped() > 0) std::printf(", %d skipped", progress.cameras_skipped());
   std::printf("%s%s\n", reconstruction.failure().empty() ? "" : " ", reconstruction.failure().c_str());
+  for (const std::string& warning : reconstruction.warnings()) std::printf("  %s\n", warning.c_str());
 }
 
 int Show(const absl::StatusOr<v1::Reconstruction>& reconstruction, const ServiceArguments& service) {
@@ -182,6 +183,9 @@ Json ToJson(const v1::Reconstruction& reconstruction) {
   json["state"] = NameOf(reconstruction.state());
   if (!reconstruction.failure().empty()) json["failure"] = reconstruction.failure();
   if (!reconstruction.stage().empty()) json["stage"] = reconstruction.stage();
+  if (reconstruction.warnings_size() > 0) {
+    json["warnings"] = std::vector<std::string>(reconstruction.warnings().begin(), reconstruction.warnings().end());
+  }
   json["cameras"] = {{"total", progress.cameras_total()},
                      {"committed", progress.cameras_committed()},
                      {"skipped", progress.cameras_skipped()},
