@@ -39,6 +39,7 @@ constexpr char kBadToken[] = "Invalid authentication token: token does not match
 constexpr int64_t kMaxBodyBytes = int64_t{1} << 40;
 // Bytes of a form that does not say how long it is are counted in such steps.
 constexpr int64_t kReserveBytes = int64_t{64} << 20;
+constexpr int64_t kMaxIgnoredBytes = int64_t{1} << 20;
 constexpr size_t kMaxOutputs = 1000;
 constexpr int kMinWorkers = 4;
 constexpr absl::Duration kShutdownGrace = absl::Seconds(2);
@@ -175,7 +176,7 @@ class FormSink final : public HttpBodySink {
 class IgnoredBody final : public HttpBodySink {
  public:
   explicit IgnoredBody(std::function<void(HttpResponse&)> reply) : reply_(std::move(reply)) {}
-  int64_t max_bytes() const override { return int64_t{1} << 20; }
+  int64_t max_bytes() const override { return kMaxIgnoredBytes; }
   bool Take(absl::Span<const uint8_t>) override { return true; }
   void Finish(HttpExchange& exchange) override { reply_(exchange.response); }
 
@@ -322,14 +323,20 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
     return MaySee(caller, uuid, *owner) ? absl::OkStatus() : services_.gate->Refused(caller, request, NoSuchTask());
   }
 
-  // A client that is still sending would not read an answer in between.
+  // A client that is still sending would not read an answer in between. Of one that has much to send the connection is
+  // closed behind the answer.
   static void DropBody(HttpExchange& exchange) {
     if (!exchange.request.has_body) return;
-    const std::string content = exchange.response.content;
-    exchange.body = std::make_unique<IgnoredBody>([content](HttpResponse& response) {
-      response.status = 200;
-      response.SetContent(content, kJsonType);
-    });
+    int64_t bytes = 0;
+    const bool is_known = absl::SimpleAtoi(exchange.request.headers.Get("Content-Length"), &bytes);
+    if (is_known && bytes > kMaxIgnoredBytes) return;
+    exchange.body =
+        std::make_unique<IgnoredBody>([status = exchange.response.status, headers = exchange.response.headers,
+                                       content = exchange.response.content](HttpResponse& response) {
+          response.headers = headers;
+          response.SetContent(content, kJsonType);
+          response.status = status;
+        });
   }
 
   void Get(const Caller& caller, const std::vector<std::string>& path, const HttpRequest& request,

@@ -222,7 +222,7 @@ TEST_F(AttacksTest, TwoThousandStreamsFollowOneReconstruction) {
   onlooker.ExpectNothingNoticed();
 }
 
-// A grey progressive JPEG of 4000 x 4000 whose last scan comes again and again: some kB that are decoded for long.
+// A grey progressive JPEG of 4000 x 4000 whose second scan comes again and again: some kB that are decoded for long.
 std::string JpegOfManyScans() {
   jpeg_compress_struct info{};
   jpeg_error_mgr errors{};
@@ -244,9 +244,10 @@ std::string JpegOfManyScans() {
   std::string bytes(reinterpret_cast<const char*>(buffer), size);
   jpeg_destroy_compress(&info);
   std::free(buffer);
-  const size_t last = bytes.rfind("\xFF\xDA");
-  const size_t end = bytes.rfind("\xFF\xD9");
-  const std::string scan = bytes.substr(last, end - last);
+  const size_t begin = bytes.find("\xFF\xDA", bytes.find("\xFF\xDA") + 2);
+  size_t end = begin + 2;
+  while (bytes[end] != '\xFF' || bytes[end + 1] == '\0') ++end;
+  const std::string scan = bytes.substr(begin, end - begin);
   for (int i = 0; i < 60; ++i) bytes.insert(end, scan);
   return bytes;
 }
