@@ -15,6 +15,7 @@ namespace {
 constexpr char kExamples[] = R"(Examples:
   meshwright convert mesh.ply -o mesh.glb
   meshwright convert mesh.ply -o cloud.las
+  meshwright convert mesh.ply -o city/tileset.json      # 3D Tiles, in a folder
   meshwright convert mesh.ply --points -o cloud.ply)";
 
 struct Arguments {

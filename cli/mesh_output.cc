@@ -44,10 +44,11 @@ absl::Status FetchPly(ServiceClient& client, const std::string& id, const std::s
 absl::Status FetchMesh(ServiceClient& client, const std::string& id, const std::string& path, bool partial) {
   MW_ASSIGN_OR_RETURN(const MeshFormat* format, MeshFormatOfPath(path));
   if (IsPly(*format)) return FetchPly(client, id, path, partial);
+  std::error_code error;
+  if (format->has_folder) std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
   const std::string ply = PartialPath(path) + ".ply";
   absl::Status fetched = FetchPly(client, id, ply, partial);
   if (fetched.ok()) fetched = ConvertPly(ply, *format, false, path);
-  std::error_code error;
   std::filesystem::remove(ply, error);
   return fetched;
 }

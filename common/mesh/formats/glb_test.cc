@@ -9,6 +9,7 @@
 
 #include "common/base/files.h"
 #include "common/base/little_endian.h"
+#include "common/mesh/formats/glb_testing.h"
 #include "common/mesh/surface_mesh.h"
 #include "common/surface/random_surface_testing.h"
 
@@ -18,45 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Glb {
-  json description;
-  std::string buffer;
-};
-
-// Splits a file into its chunks and holds it to the rules of the container.
-Glb Split(const std::string& bytes) {
-  Glb glb;
-  const auto word = [&](size_t offset) { return LoadLittleEndian<uint32_t>(bytes.data() + offset); };
-  EXPECT_EQ(bytes.substr(0, 4), "glTF");
-  EXPECT_EQ(word(4), 2U);
-  EXPECT_EQ(word(8), bytes.size());
-  EXPECT_EQ(bytes.substr(16, 4), "JSON");
-  const size_t json_bytes = word(12);
-  EXPECT_EQ(json_bytes % 4, 0U);
-  glb.description = json::parse(bytes.substr(20, json_bytes));
-  const size_t chunk = 20 + json_bytes;
-  if (chunk == bytes.size()) return glb;
-  EXPECT_EQ(bytes.substr(chunk + 4, 4), std::string("BIN\0", 4));
-  EXPECT_EQ(chunk + 8 + word(chunk), bytes.size());
-  glb.buffer = bytes.substr(chunk + 8);
-  EXPECT_EQ(glb.description["buffers"][0]["byteLength"], glb.buffer.size());
-  return glb;
-}
-
-// First byte of row `row` of an accessor whose rows have `row_bytes` bytes.
-const char* Row(const Glb& glb, const json& accessor, size_t row, size_t row_bytes) {
-  const json& view = glb.description["bufferViews"][accessor["bufferView"].get<size_t>()];
-  EXPECT_EQ(view["byteLength"], accessor["count"].get<size_t>() * row_bytes);
-  EXPECT_EQ(view["byteOffset"].get<size_t>() % 4, 0U);
-  const size_t offset = view["byteOffset"].get<size_t>() + row * row_bytes;
-  EXPECT_LE(offset + row_bytes, glb.buffer.size());
-  return glb.buffer.data() + offset;
-}
-
-Eigen::Vector3f VectorAt(const char* bytes) {
-  return {LoadLittleEndian<float>(bytes), LoadLittleEndian<float>(bytes + 4), LoadLittleEndian<float>(bytes + 8)};
-}
-
 class GlbTest : public testing::Test {
  protected:
   GlbTest() : path_(fs::path(testing::TempDir()) / ("meshwright_glb_test_" + std::to_string(::getpid()) + ".glb")) {}
@@ -64,7 +26,7 @@ class GlbTest : public testing::Test {
   Glb Write(const TriangleMesh& mesh) {
     const absl::Status status = WriteGlb(mesh, path_);
     EXPECT_TRUE(status.ok()) << status;
-    return Split(*ReadFile(path_));
+    return SplitGlb(*ReadFile(path_));
   }
   std::string path_;
 };

@@ -14,6 +14,7 @@
 #include "common/mesh/formats/las.h"
 #include "common/mesh/formats/obj.h"
 #include "common/mesh/formats/stl.h"
+#include "common/mesh/formats/tileset.h"
 
 namespace meshwright {
 namespace {
@@ -44,21 +45,28 @@ absl::Status WritePlyRows(const MeshRows& mesh, const std::string& path) {
 }
 
 // "ply, glb, ...".
-std::string ListOf(const char* MeshFormat::*member) {
-  return absl::StrJoin(MeshFormats(), ", ",
-                       [member](std::string* out, const MeshFormat& format) { absl::StrAppend(out, format.*member); });
+std::string NamesOfSingleFiles() {
+  std::vector<std::string> names;
+  for (const MeshFormat& format : MeshFormats()) {
+    if (!format.has_folder) names.emplace_back(format.name);
+  }
+  return absl::StrJoin(names, ", ");
 }
 
 }  // namespace
 
 const std::vector<MeshFormat>& MeshFormats() {
   static const auto* const formats = new std::vector<MeshFormat>{
-      {"ply", ".ply", "model/ply", "PLY", "every attribute", false, WritePlyRows},
-      {"glb", ".glb", "model/gltf-binary", "GLB (binary glTF 2.0)", "for viewers and web pages", true,
+      {"ply", ".ply", "model/ply", "PLY", "every attribute", false, false, WritePlyRows},
+      {"glb", ".glb", "model/gltf-binary", "GLB (binary glTF 2.0)", "for viewers and web pages", true, false,
        [](const MeshRows& mesh, const std::string& path) { return WriteGlb(mesh, path); }},
-      {"obj", ".obj", "model/obj", "OBJ", "text, for every program", true, WriteObj},
-      {"stl", ".stl", "model/stl", "STL (binary)", "triangles alone, for printing and CAD", false, WriteStl},
-      {"las", ".las", "application/vnd.las", "LAS 1.2 point cloud", "vertices with colours, for GIS", false, WriteLas},
+      {"obj", ".obj", "model/obj", "OBJ", "text, for every program", true, false, WriteObj},
+      {"stl", ".stl", "model/stl", "STL (binary)", "triangles alone, for printing and CAD", false, false, WriteStl},
+      {"las", ".las", "application/vnd.las", "LAS 1.2 point cloud", "vertices with colours, for GIS", false, false,
+       WriteLas},
+      {"3d-tiles", ".json", "application/json", "3D Tiles 1.1",
+       "levels of detail, for large meshes on maps and web pages", false, true,
+       [](const MeshRows& mesh, const std::string& path) { return WriteTileset(mesh, path); }},
   };
   return *formats;
 }
@@ -74,19 +82,27 @@ absl::StatusOr<const MeshFormat*> MeshFormatOfPath(const std::string& path) {
 
 absl::StatusOr<const MeshFormat*> MeshFormatByName(const std::string& name) {
   for (const MeshFormat& format : MeshFormats()) {
-    if (name == format.name) return &format;
+    if (name != format.name) continue;
+    if (!format.has_folder) return &format;
+    return absl::InvalidArgumentError(absl::StrCat("format is \"", name, "\", which is a folder of files: ",
+                                                   "meshwright fetch -o DIR/tileset.json makes it; expected one of ",
+                                                   NamesOfSingleFiles()));
   }
   return absl::InvalidArgumentError(
-      absl::StrCat("format is \"", name.substr(0, 32), "\", expected one of ", ListOf(&MeshFormat::name)));
+      absl::StrCat("format is \"", name.substr(0, 32), "\", expected one of ", NamesOfSingleFiles()));
 }
 
-std::string MeshFormatEndings() { return ListOf(&MeshFormat::ending); }
+std::string MeshFormatEndings() {
+  return absl::StrJoin(MeshFormats(), ", ",
+                       [](std::string* out, const MeshFormat& format) { absl::StrAppend(out, format.ending); });
+}
 
 bool IsPly(const MeshFormat& format) { return &format == MeshFormats().data(); }
 
 std::string DescribeMeshFormats() {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const MeshFormat& format : MeshFormats()) {
+    if (format.has_folder) continue;
     list.push_back({{"name", format.name},
                     {"ending", format.ending},
                     {"mediaType", format.media_type},

@@ -18,6 +18,7 @@ struct MeshFormat {
   const char* title;  // for people
   const char* note;   // what it keeps
   bool textured;      // can carry a texture atlas
+  bool has_folder;    // a folder beside the file has the rest of it: nothing to be sent as one file
   // The file appears whole or not at all. `path` names the file; it need not have the ending.
   absl::Status (*write)(const MeshRows& mesh, const std::string& path);
 };
@@ -27,13 +28,13 @@ const std::vector<MeshFormat>& MeshFormats();
 
 // By the ending of a file's name, whatever the case. InvalidArgument tells the endings that there are.
 absl::StatusOr<const MeshFormat*> MeshFormatOfPath(const std::string& path);
-// By name. InvalidArgument tells the names that there are.
+// By name, of those that are one file. InvalidArgument tells the names that there are.
 absl::StatusOr<const MeshFormat*> MeshFormatByName(const std::string& name);
 // ".ply, .glb, ...".
 std::string MeshFormatEndings();
 bool IsPly(const MeshFormat& format);
 
-// {"formats": [{"name": "ply", ...}, ...]} for those who offer the formats to their users.
+// {"formats": [{"name": "ply", ...}, ...]}, those that are one file, for services to offer.
 std::string DescribeMeshFormats();
 
 // Writes the mesh of a PLY file in another format, in memory that does not grow with the mesh when the file is one of

@@ -45,13 +45,16 @@ class MeshFormatTest : public testing::Test {
 };
 
 TEST_F(MeshFormatTest, EndingAndNameLeadToTheSameFormat) {
+  size_t single_files = 0;
   for (const MeshFormat& format : MeshFormats()) {
-    EXPECT_EQ(*MeshFormatByName(format.name), &format);
     EXPECT_EQ(*MeshFormatOfPath(std::string("a.b/c") + format.ending), &format);
+    if (format.has_folder) continue;
+    EXPECT_EQ(*MeshFormatByName(format.name), &format);
+    ++single_files;
   }
   EXPECT_EQ(*MeshFormatOfPath("MODEL.GLB"), *MeshFormatByName("glb"));
   EXPECT_TRUE(IsPly(MeshFormats().front()));
-  EXPECT_EQ(nlohmann::json::parse(DescribeMeshFormats())["formats"].size(), MeshFormats().size());
+  EXPECT_EQ(nlohmann::json::parse(DescribeMeshFormats())["formats"].size(), single_files);
 }
 
 TEST_F(MeshFormatTest, UnknownEndingsAreToldWithThoseThatThereAre) {
