@@ -47,6 +47,7 @@ void AddSceneOptions(CLI::App& command, SceneArguments& scene);
 void AddOutputOptions(CLI::App& command, OutputSettings& output);
 // --texture-error and what else an atlas depends on.
 void AddTextureOptions(CLI::App& command, TextureOptions& options);
+void AddCompressOption(CLI::App& command, bool& compressed);
 void AddThreadsOption(CLI::App& command, int& threads);
 
 // Cores that this process may use.

@@ -14,6 +14,7 @@ namespace {
 
 constexpr char kExamples[] = R"(Examples:
   meshwright convert mesh.ply -o mesh.glb
+  meshwright convert mesh.ply -o mesh.glb --compress    # for web pages
   meshwright convert mesh.ply -o cloud.las
   meshwright convert mesh.ply -o city/tileset.json      # 3D Tiles, in a folder
   meshwright convert mesh.ply --points -o cloud.ply)";
@@ -22,6 +23,7 @@ struct Arguments {
   std::string mesh;
   std::string output_path;
   bool points = false;
+  MeshWriteOptions write;
 };
 
 absl::Status Convert(const Arguments& arguments, const MeshFormat& format) {
@@ -32,13 +34,16 @@ absl::Status Convert(const Arguments& arguments, const MeshFormat& format) {
   absl::StatusOr<MeshRows> mesh = MeshRows::OpenPly(arguments.mesh);
   if (!mesh.ok()) return BadInput(mesh.status());
   if (arguments.points) mesh->DropFaces();
-  absl::Status written = format.write(*mesh, arguments.output_path);
+  absl::Status written = format.write(*mesh, arguments.output_path, arguments.write);
   return absl::IsInvalidArgument(written) ? BadInput(written) : written;
 }
 
 int RunCommand(const Arguments& arguments) {
   const absl::StatusOr<const MeshFormat*> format = MeshFormatOfPath(arguments.output_path);
   if (!format.ok()) return FailWrongUse(std::string(format.status().message()));
+  if (const absl::Status valid = CheckCompressible(**format, arguments.write, arguments.output_path); !valid.ok()) {
+    return FailWrongUse(std::string(valid.message()));
+  }
   const absl::Status status = Convert(arguments, **format);
   return status.ok() ? kExitDone : Fail(status);
 }
@@ -55,6 +60,7 @@ void AddConvertCommand(CLI::App& program, Run& run) {
                   absl::StrCat("what to write; its ending says the format: ", MeshFormatEndings()))
       ->required();
   command.add_flag("--points", arguments->points, "the vertices alone, as a point cloud");
+  AddCompressOption(command, arguments->write.compressed);
   command.callback([arguments, &run] { run = [arguments] { return RunCommand(*arguments); }; });
 }
 

@@ -65,7 +65,7 @@ absl::Status Crop(const Arguments& arguments, const MeshFormat& format) {
     return BadInput(absl::FailedPreconditionError(
         absl::StrCat(arguments.region, ": nothing of ", arguments.mesh, " is in the box")));
   }
-  const absl::Status written = format.write(MeshRows(part), arguments.output_path);
+  const absl::Status written = format.write(MeshRows(part), arguments.output_path, {});
   return absl::IsInvalidArgument(written) ? BadInput(written) : written;
 }
 

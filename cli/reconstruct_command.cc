@@ -97,12 +97,14 @@ int Reconstruct(Arguments& arguments) {
   if (!arguments.ground_truth.empty() && !IsPly(**format)) {
     return FailWrongUse(absl::StrCat("-o is ", settings.output_path, ", expected a .ply with --ground-truth"));
   }
-  if (const absl::Status valid = arguments.texture.Validate(); !valid.ok()) {
-    return FailWrongUse(std::string(valid.message()));
+  for (const absl::Status& valid :
+       {arguments.texture.Validate(), CheckCompressible(**format, settings.write, settings.output_path)}) {
+    if (!valid.ok()) return FailWrongUse(std::string(valid.message()));
   }
   if (!arguments.no_texture) {
     settings.texture = arguments.texture;
     settings.texture->max_image_size = arguments.options.max_image_size;
+    settings.texture->compressed = settings.write.compressed;
   }
   settings.report_path = BesideOutput(settings.output_path, ".report.json");
   if (settings.work_folder.empty()) settings.work_folder = settings.output_path + ".work";
@@ -169,6 +171,7 @@ void AddReconstructCommand(CLI::App& program, Run& run) {
   command.add_flag("--no-texture", arguments->no_texture,
                    "GLB and OBJ with the whole mesh and colours at its vertices, not simplified with a texture");
   AddTextureOptions(command, arguments->texture);
+  AddCompressOption(command, arguments->settings.write.compressed);
   command.add_flag("--parts", arguments->parts, "also write one PLY per reference camera, into OUTPUT.parts/");
   command.add_option("--work-dir", arguments->settings.work_folder,
                      "state and surfaces while it runs [OUTPUT.ply.work]; removed at the end");

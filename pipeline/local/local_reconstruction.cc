@@ -304,7 +304,7 @@ class LocalReconstruction {
   // What is to be told of the texture; null when there is none.
   absl::StatusOr<Json> WriteInFormat(const std::string& ply_path) {
     if (!format_->textured || !settings_.texture.has_value()) {
-      MW_RETURN_IF_ERROR(ConvertPly(ply_path, *format_, false, settings_.output_path));
+      MW_RETURN_IF_ERROR(ConvertPly(ply_path, *format_, false, settings_.output_path, settings_.write));
       return Json();
     }
     MW_ASSIGN_OR_RETURN(TriangleMesh mesh, ReadPly(ply_path));

@@ -13,6 +13,7 @@
 #include "pipeline/options/reconstruction_options.h"
 #include "pipeline/texturing/texture_options.h"
 
+#include "common/mesh/formats/mesh_format.h"
 #include "common/scene/scene.h"
 #include "common/surface/patch_lattice.h"
 
@@ -21,6 +22,7 @@ namespace meshwright {
 // Where a reconstruction's files go and what it may use. Nothing here changes the mesh.
 struct LocalSettings {
   std::string output_path;  // the mesh, in the format that its ending says
+  MeshWriteOptions write;   // of a mesh without a texture
   // Of a format that carries one: the mesh is simplified and gets its colours from an atlas. None: all of the mesh,
   // with colours at its vertices.
   std::optional<TextureOptions> texture;

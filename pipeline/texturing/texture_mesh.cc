@@ -110,7 +110,8 @@ class Texturing {
     for (const PageSize& page : layout.pages) report_.page_pixels += int64_t{page.width} * page.height;
     MW_ASSIGN_OR_RETURN(const auto writer,
                         TexturedMeshWriter::Create(format, path, CutParts(layout), scene_.offset,
-                                                   {.png = options_.png, .jpeg_quality = options_.jpeg_quality}));
+                                                   {.png = options_.png, .jpeg_quality = options_.jpeg_quality},
+                                                   {.compressed = options_.compressed}));
     MW_RETURN_IF_ERROR(DrawPages(layout, *writer));
     return writer->Commit();
   }

@@ -12,6 +12,7 @@ struct TextureOptions {
   double seam_cost = 2;       // of an edge between two photographs, in units of the best photograph's quality, 0 .. 100
   bool png = false;           // pages without loss
   int jpeg_quality = 92;      // 1 .. 100
+  bool compressed = false;    // GLB by EXT_meshopt_compression
   bool adjust_colors = true;  // levels seams; without it photographs are cut and pasted as they are
 
   absl::Status Validate() const;

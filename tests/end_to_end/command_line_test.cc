@@ -39,6 +39,7 @@ TEST(CommandLineTest, WrongUseIsTwo) {
       {"reconstruct", "scene", "-o", "x.docx"},
       {"reconstruct", "scene", "-o", "x"},
       {"convert", "x.ply", "-o", "x.docx"},
+      {"convert", "x.ply", "-o", "x.las", "--compress"},
       {"fetch", "id", "-o", "x.docx"},
       {"reconstruct", "scene", "-o", "x.ply", "--threads", "0"},
       {"reconstruct", "scene", "-o", "x.ply", "--threads", "many"},

@@ -15,8 +15,9 @@ const PAGE = `<!doctype html><script type="importmap">
 <body style="margin: 0"><script type="module">
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 window.show = async (url) => {
-  const { scene: model } = await new GLTFLoader().loadAsync(url);
+  const { scene: model } = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).loadAsync(url);
   const renderer = new THREE.WebGLRenderer({ preserveDrawingBuffer: true });
   renderer.setSize(640, 480);
   document.body.replaceChildren(renderer.domElement);

@@ -1,13 +1,14 @@
 #include "common/mesh/formats/glb.h"
 
 #include <array>
-#include <cmath>
 #include <cstdint>
-#include <limits>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "common/mesh/formats/glb_compression.h"
 #include "common/mesh/formats/glb_container.h"
+#include "common/mesh/formats/glb_values.h"
 #include "common/mesh/formats/row_writer.h"
 
 namespace meshwright {
@@ -18,16 +19,7 @@ using nlohmann::json;
 constexpr uint64_t kVectorBytes = 3 * sizeof(float);
 constexpr uint64_t kColorBytes = 4 * sizeof(uint16_t);
 
-// IEC 61966-2-1.
-std::array<uint16_t, 256> LinearFromSrgb() {
-  std::array<uint16_t, 256> table = {};
-  for (int i = 0; i < 256; ++i) {
-    const double c = i / 255.0;
-    const double linear = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-    table[static_cast<size_t>(i)] = static_cast<uint16_t>(std::lround(65535 * linear));
-  }
-  return table;
-}
+json UnlitMaterial() { return {{"doubleSided", true}, {"extensions", {{"KHR_materials_unlit", json::object()}}}}; }
 
 // The scene with its buffer: positions, normals, colours, corners of faces.
 glb::Description Describe(const MeshRows& mesh) {
@@ -59,16 +51,10 @@ glb::Description Describe(const MeshRows& mesh) {
   gltf["scenes"][0]["nodes"] = {0};
   gltf["nodes"] = {glb::MeshNode(mesh.offset())};
   gltf["meshes"] = {{{"primitives", {primitive}}}};
-  gltf["materials"] = {{{"doubleSided", true}, {"extensions", {{"KHR_materials_unlit", json::object()}}}}};
+  gltf["materials"] = {UnlitMaterial()};
   gltf["extensionsUsed"] = {"KHR_materials_unlit"};
   gltf["buffers"] = {{{"byteLength", description.buffer_bytes}}};
   return description;
-}
-
-// glTF wants unit normals; one that has no direction becomes any.
-Eigen::Vector3f UnitOrAny(const Eigen::Vector3f& normal) {
-  const float length = normal.norm();
-  return length > 0 && std::isfinite(length) ? Eigen::Vector3f(normal / length) : Eigen::Vector3f::UnitZ();
 }
 
 absl::Status AppendBuffer(const MeshRows& mesh, AtomicFile& file) {
@@ -77,14 +63,11 @@ absl::Status AppendBuffer(const MeshRows& mesh, AtomicFile& file) {
       vertices, [&](size_t i, std::string& out) { AppendVector(mesh.Position(i), out); }, file));
   if (mesh.has_normals()) {
     MW_RETURN_IF_ERROR(AppendRows(
-        vertices, [&](size_t i, std::string& out) { AppendVector(UnitOrAny(mesh.Normal(i)), out); }, file));
+        vertices, [&](size_t i, std::string& out) { AppendVector(glb::UnitOrAny(mesh.Normal(i)), out); }, file));
   }
   if (mesh.has_colors()) {
-    const std::array<uint16_t, 256> linear = LinearFromSrgb();
-    const auto append = [&](size_t i, std::string& out) {
-      for (const uint8_t channel : mesh.Color(i)) AppendLittleEndian(linear[channel], out);
-      AppendLittleEndian(std::numeric_limits<uint16_t>::max(), out);
-    };
+    const std::array<uint16_t, 256> linear = glb::LinearFromSrgb();
+    const auto append = [&](size_t i, std::string& out) { glb::AppendLinearColor(mesh.Color(i), linear, out); };
     MW_RETURN_IF_ERROR(AppendRows(vertices, append, file));
   }
   const auto append = [&](size_t i, std::string& out) {
@@ -93,7 +76,44 @@ absl::Status AppendBuffer(const MeshRows& mesh, AtomicFile& file) {
   return AppendRows(mesh.faces(), append, file);
 }
 
+glb::PrimitiveArrays LoadArrays(const MeshRows& mesh) {
+  glb::PrimitiveArrays arrays;
+  for (size_t v = 0; v < mesh.vertices(); ++v) {
+    arrays.positions.push_back(mesh.Position(v));
+    if (mesh.has_normals()) arrays.normals.push_back(mesh.Normal(v));
+    if (mesh.has_colors()) arrays.colors.push_back(mesh.Color(v));
+  }
+  for (size_t f = 0; f < mesh.faces(); ++f) arrays.faces.push_back(mesh.Face(f));
+  return arrays;
+}
+
 }  // namespace
+
+absl::Status WriteCompressedGlb(const MeshRows& mesh, const std::string& path) {
+  if (mesh.vertices() == 0) return WriteGlb(mesh, path);
+  const MeshRows::Bounds bounds = mesh.FindBounds();
+  const glb::PositionLattice lattice = glb::LatticeFor(bounds.low, bounds.high, mesh.vertices());
+  return glb::WriteCompressed(LoadArrays(mesh), lattice, mesh.offset(), path);
+}
+
+absl::Status glb::WriteCompressed(PrimitiveArrays arrays, const PositionLattice& lattice, const Eigen::Vector3d& offset,
+                                  const std::string& path) {
+  const CompressedPrimitive compressed(std::move(arrays), lattice);
+  Description description = NewDescription();
+  json primitive = compressed.Describe(description);
+  primitive["material"] = 0;
+  json& gltf = description.gltf;
+  gltf["scenes"][0]["nodes"] = {0};
+  gltf["nodes"] = {CompressedMeshNode(offset, lattice)};
+  gltf["meshes"] = {{{"primitives", {primitive}}}};
+  gltf["materials"] = {UnlitMaterial()};
+  DescribeCompressedBuffers(description);
+  MW_ASSIGN_OR_RETURN(const std::string head, Head(description, 0, path));
+  MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
+  MW_RETURN_IF_ERROR(file.Append(head));
+  MW_RETURN_IF_ERROR(file.Append(compressed.bytes()));
+  return file.Commit();
+}
 
 absl::Status WriteGlb(const MeshRows& mesh, const std::string& path) {
   MW_ASSIGN_OR_RETURN(const std::string head, glb::Head(Describe(mesh), 0, path));

@@ -10,6 +10,7 @@
 namespace meshwright::glb {
 
 // Constants of the glTF 2.0 specification.
+constexpr int kByte = 5120;
 constexpr int kUnsignedShort = 5123;
 constexpr int kUnsignedInt = 5125;
 constexpr int kFloat = 5126;
@@ -22,6 +23,7 @@ constexpr int kTriangles = 4;
 struct Description {
   nlohmann::json gltf;
   uint64_t buffer_bytes = 0;
+  uint64_t decoded_bytes = 0;  // of the second buffer, which the extension's decoders make of the first
 };
 
 // asset, one scene, and nothing in it yet.

@@ -19,7 +19,7 @@
 namespace meshwright {
 namespace {
 
-absl::Status WritePlyRows(const MeshRows& mesh, const std::string& path) {
+absl::Status WritePlyRows(const MeshRows& mesh, const std::string& path, const MeshWriteOptions& /*options*/) {
   constexpr size_t kRowsAtOnce = 1 << 14;
   const PlyAttributes attributes = mesh.attributes();
   MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, attributes));
@@ -44,6 +44,20 @@ absl::Status WritePlyRows(const MeshRows& mesh, const std::string& path) {
   return writer.Commit();
 }
 
+// Of a format without choices.
+template <absl::Status (*write)(const MeshRows& mesh, const std::string& path)>
+absl::Status Write(const MeshRows& mesh, const std::string& path, const MeshWriteOptions& /*options*/) {
+  return write(mesh, path);
+}
+
+absl::Status WriteGlbAs(const MeshRows& mesh, const std::string& path, const MeshWriteOptions& options) {
+  return options.compressed ? WriteCompressedGlb(mesh, path) : WriteGlb(mesh, path);
+}
+
+absl::Status WriteTilesetAs(const MeshRows& mesh, const std::string& path, const MeshWriteOptions& options) {
+  return WriteTileset(mesh, path, {.compressed = options.compressed});
+}
+
 // "ply, glb, ...".
 std::string NamesOfSingleFiles() {
   std::vector<std::string> names;
@@ -57,16 +71,32 @@ std::string NamesOfSingleFiles() {
 
 const std::vector<MeshFormat>& MeshFormats() {
   static const auto* const formats = new std::vector<MeshFormat>{
-      {"ply", ".ply", "model/ply", "PLY", "every attribute", false, false, WritePlyRows},
-      {"glb", ".glb", "model/gltf-binary", "GLB (binary glTF 2.0)", "for viewers and web pages", true, false,
-       [](const MeshRows& mesh, const std::string& path) { return WriteGlb(mesh, path); }},
-      {"obj", ".obj", "model/obj", "OBJ", "text, for every program", true, false, WriteObj},
-      {"stl", ".stl", "model/stl", "STL (binary)", "triangles alone, for printing and CAD", false, false, WriteStl},
-      {"las", ".las", "application/vnd.las", "LAS 1.2 point cloud", "vertices with colours, for GIS", false, false,
-       WriteLas},
-      {"3d-tiles", ".json", "application/json", "3D Tiles 1.1",
-       "levels of detail, for large meshes on maps and web pages", false, true,
-       [](const MeshRows& mesh, const std::string& path) { return WriteTileset(mesh, path); }},
+      {"ply", ".ply", "model/ply", "PLY", "every attribute", WritePlyRows},
+      {.name = "glb",
+       .ending = ".glb",
+       .media_type = "model/gltf-binary",
+       .title = "GLB (binary glTF 2.0)",
+       .note = "for viewers and web pages",
+       .write = WriteGlbAs,
+       .textured = true,
+       .compressible = true},
+      {.name = "obj",
+       .ending = ".obj",
+       .media_type = "model/obj",
+       .title = "OBJ",
+       .note = "text, for every program",
+       .write = Write<WriteObj>,
+       .textured = true},
+      {"stl", ".stl", "model/stl", "STL (binary)", "triangles alone, for printing and CAD", Write<WriteStl>},
+      {"las", ".las", "application/vnd.las", "LAS 1.2 point cloud", "vertices with colours, for GIS", Write<WriteLas>},
+      {.name = "3d-tiles",
+       .ending = ".json",
+       .media_type = "application/json",
+       .title = "3D Tiles 1.1",
+       .note = "levels of detail, for large meshes on maps and web pages",
+       .write = WriteTilesetAs,
+       .has_folder = true,
+       .compressible = true},
   };
   return *formats;
 }
@@ -114,10 +144,21 @@ std::string DescribeMeshFormats() {
   return JsonText(answer);
 }
 
-absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, bool points, const std::string& path) {
+absl::Status CheckCompressible(const MeshFormat& format, const MeshWriteOptions& options, const std::string& path) {
+  if (!options.compressed || format.compressible) return absl::OkStatus();
+  std::vector<std::string> endings;
+  for (const MeshFormat& other : MeshFormats()) {
+    if (other.compressible) endings.emplace_back(other.ending);
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat(path, ": ", format.title, " is not compressed, expected ", absl::StrJoin(endings, " or ")));
+}
+
+absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, bool points, const std::string& path,
+                        const MeshWriteOptions& options) {
   MW_ASSIGN_OR_RETURN(MeshRows mesh, MeshRows::OpenPly(ply_path));
   if (points) mesh.DropFaces();
-  return format.write(mesh, path);
+  return format.write(mesh, path, options);
 }
 
 }  // namespace meshwright

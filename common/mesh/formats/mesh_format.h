@@ -10,6 +10,11 @@
 
 namespace meshwright {
 
+// How a mesh is written.
+struct MeshWriteOptions {
+  bool compressed = false;  // in formats that have the choice
+};
+
 // A format that a mesh can be written in. Every program reads this one table.
 struct MeshFormat {
   const char* name;    // "glb": what ?format= takes
@@ -17,10 +22,11 @@ struct MeshFormat {
   const char* media_type;
   const char* title;  // for people
   const char* note;   // what it keeps
-  bool textured;      // can carry a texture atlas
-  bool has_folder;    // a folder beside the file has the rest of it: nothing to be sent as one file
   // The file appears whole or not at all. `path` names the file; it need not have the ending.
-  absl::Status (*write)(const MeshRows& mesh, const std::string& path);
+  absl::Status (*write)(const MeshRows& mesh, const std::string& path, const MeshWriteOptions& options);
+  bool textured = false;      // can carry a texture atlas
+  bool has_folder = false;    // a folder beside the file has the rest of it: nothing to be sent as one file
+  bool compressible = false;  // by EXT_meshopt_compression
 };
 
 // PLY, what a reconstruction writes by itself, is the first.
@@ -32,6 +38,8 @@ absl::StatusOr<const MeshFormat*> MeshFormatOfPath(const std::string& path);
 absl::StatusOr<const MeshFormat*> MeshFormatByName(const std::string& name);
 // ".ply, .glb, ...".
 std::string MeshFormatEndings();
+// InvalidArgument when the format knows no compression that was asked for; `path` is named.
+absl::Status CheckCompressible(const MeshFormat& format, const MeshWriteOptions& options, const std::string& path);
 bool IsPly(const MeshFormat& format);
 
 // {"formats": [{"name": "ply", ...}, ...]}, those that are one file, for services to offer.
@@ -39,7 +47,8 @@ std::string DescribeMeshFormats();
 
 // Writes the mesh of a PLY file in another format, in memory that does not grow with the mesh when the file is one of
 // ours. `points`: its vertices alone. Errors: those of MeshRows::OpenPly and of the format.
-absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, bool points, const std::string& path);
+absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, bool points, const std::string& path,
+                        const MeshWriteOptions& options = {});
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

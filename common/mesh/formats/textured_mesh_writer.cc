@@ -4,11 +4,13 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <absl/strings/str_cat.h>
 
 #include "common/base/check.h"
 #include "common/image/encode.h"
 #include "common/json/json_text.h"
+#include "common/mesh/formats/glb_compression.h"
 #include "common/mesh/formats/glb_container.h"
 #include "common/mesh/formats/obj_text.h"
 #include "common/mesh/formats/row_writer.h"
@@ -26,12 +28,10 @@ std::string Encode(const ColorImage& page, const TexturePictures& pictures) {
 class GlbWriter final : public TexturedMeshWriter {
  public:
   GlbWriter(std::string path, std::vector<TexturePart> parts, const Eigen::Vector3d& offset,
-            const TexturePictures& pictures, AtomicFile file)
-      : path_(std::move(path)),
-        parts_(std::move(parts)),
-        offset_(offset),
-        pictures_(pictures),
-        file_(std::move(file)) {}
+            const TexturePictures& pictures, bool compressed, AtomicFile file)
+      : path_(std::move(path)), parts_(std::move(parts)), offset_(offset), pictures_(pictures), file_(std::move(file)) {
+    if (compressed) Compress();
+  }
 
   absl::Status Begin() {
     constexpr uint64_t kLongest = 999'999'999;  // bytes of a picture, as long as a number can be
@@ -39,6 +39,8 @@ class GlbWriter final : public TexturedMeshWriter {
     json_bytes_ = JsonText(longest.gltf).size();
     MW_ASSIGN_OR_RETURN(const std::string head, Head(std::vector<uint64_t>(parts_.size(), 0)));
     MW_RETURN_IF_ERROR(file_.Append(head));
+    for (const glb::CompressedPrimitive& part : compressed_) MW_RETURN_IF_ERROR(file_.Append(part.bytes()));
+    if (is_compressed()) return absl::OkStatus();
     for (const TexturePart& part : parts_) {
       MW_RETURN_IF_ERROR(AppendRows(
           part.positions.size(), [&](size_t i, std::string& out) { AppendVector(part.positions[i], out); }, file_));
@@ -70,6 +72,28 @@ class GlbWriter final : public TexturedMeshWriter {
   }
 
  private:
+  bool is_compressed() const { return !compressed_.empty(); }
+
+  // All parts are on one lattice: they have one node.
+  void Compress() {
+    Eigen::AlignedBox3f box;
+    size_t vertices = 0;
+    for (const TexturePart& part : parts_) {
+      for (const Eigen::Vector3f& x : part.positions) box.extend(x);
+      vertices += part.positions.size();
+    }
+    lattice_ = glb::LatticeFor(box.min(), box.max(), vertices);
+    for (TexturePart& part : parts_) {
+      compressed_.emplace_back(glb::PrimitiveArrays{.positions = std::move(part.positions),
+                                                    .normals = {},
+                                                    .colors = {},
+                                                    .texture_coordinates = std::move(part.texture_coordinates),
+                                                    .faces = std::move(part.faces)},
+                               lattice_);
+      part = {};
+    }
+  }
+
   absl::StatusOr<std::string> Head(const std::vector<uint64_t>& picture_bytes) const {
     return glb::Head(Describe(picture_bytes), json_bytes_, path_);
   }
@@ -79,7 +103,7 @@ class GlbWriter final : public TexturedMeshWriter {
     json& gltf = description.gltf;
     json primitives = json::array();
     for (size_t i = 0; i < parts_.size(); ++i) {
-      json primitive = DescribePart(parts_[i], description);
+      json primitive = is_compressed() ? compressed_[i].Describe(description) : DescribePart(parts_[i], description);
       primitive["material"] = i;
       primitives.push_back(std::move(primitive));
     }
@@ -100,10 +124,14 @@ class GlbWriter final : public TexturedMeshWriter {
     gltf["samplers"] = {
         {{"magFilter", kLinear}, {"minFilter", kLinearMipmapLinear}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}}};
     gltf["scenes"][0]["nodes"] = {0};
-    gltf["nodes"] = {glb::MeshNode(offset_)};
+    gltf["nodes"] = {is_compressed() ? glb::CompressedMeshNode(offset_, lattice_) : glb::MeshNode(offset_)};
     gltf["meshes"] = {{{"primitives", std::move(primitives)}}};
-    gltf["extensionsUsed"] = {"KHR_materials_unlit"};
-    gltf["buffers"] = {{{"byteLength", description.buffer_bytes}}};
+    if (is_compressed()) {
+      glb::DescribeCompressedBuffers(description);
+    } else {
+      gltf["extensionsUsed"] = {"KHR_materials_unlit"};
+      gltf["buffers"] = {{{"byteLength", description.buffer_bytes}}};
+    }
     return description;
   }
 
@@ -130,7 +158,9 @@ class GlbWriter final : public TexturedMeshWriter {
   }
 
   const std::string path_;
-  const std::vector<TexturePart> parts_;
+  std::vector<TexturePart> parts_;
+  glb::PositionLattice lattice_;
+  std::vector<glb::CompressedPrimitive> compressed_;  // of the parts, which are empty then; none: not compressed
   const Eigen::Vector3d offset_;
   const TexturePictures pictures_;
   AtomicFile file_;
@@ -208,19 +238,18 @@ class ObjWriter final : public TexturedMeshWriter {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<TexturedMeshWriter>> TexturedMeshWriter::Create(const MeshFormat& format,
-                                                                               const std::string& path,
-                                                                               std::vector<TexturePart> parts,
-                                                                               const Eigen::Vector3d& offset,
-                                                                               const TexturePictures& pictures) {
-  MW_CHECK(format.textured);
+absl::StatusOr<std::unique_ptr<TexturedMeshWriter>> TexturedMeshWriter::Create(
+    const MeshFormat& format, const std::string& path, std::vector<TexturePart> parts, const Eigen::Vector3d& offset,
+    const TexturePictures& pictures, const MeshWriteOptions& options) {
+  MW_CHECK(format.textured && (!options.compressed || format.compressible));
   MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
   if (std::string(format.name) == "obj") {
     auto writer = std::make_unique<ObjWriter>(path, pictures, std::move(file));
     MW_RETURN_IF_ERROR(writer->Begin(parts, offset));
     return writer;
   }
-  auto writer = std::make_unique<GlbWriter>(path, std::move(parts), offset, pictures, std::move(file));
+  auto writer =
+      std::make_unique<GlbWriter>(path, std::move(parts), offset, pictures, options.compressed, std::move(file));
   MW_RETURN_IF_ERROR(writer->Begin());
   return writer;
 }

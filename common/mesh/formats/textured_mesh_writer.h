@@ -31,11 +31,12 @@ struct TexturePictures {
 class TexturedMeshWriter {
  public:
   // `format.textured` must be set. `offset`: world = position + offset. Errors of AtomicFile; OutOfRange beyond the 4
-  // GiB of GLB.
+  // GiB of GLB. Compressed parts are held in memory until the head is written.
   static absl::StatusOr<std::unique_ptr<TexturedMeshWriter>> Create(const MeshFormat& format, const std::string& path,
                                                                     std::vector<TexturePart> parts,
                                                                     const Eigen::Vector3d& offset,
-                                                                    const TexturePictures& pictures);
+                                                                    const TexturePictures& pictures,
+                                                                    const MeshWriteOptions& options = {});
   virtual ~TexturedMeshWriter() = default;
 
   // One for each part, in their order.

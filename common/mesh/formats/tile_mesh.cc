@@ -171,5 +171,15 @@ TileMesh ParentMesh(const std::vector<TileMesh>& children, const TileTree& tree,
   }
 }
 
+std::vector<Eigen::Vector3f> SnappedPositions(const TileMesh& mesh, const TileTree& tree, const Tile& tile) {
+  std::vector<Eigen::Vector3f> snapped;
+  for (size_t v = 0; v < mesh.positions.size(); ++v) {
+    const double step = tree.LatticeStep(std::min(tile.depth, mesh.common_depth[v] + 1));
+    const Eigen::Vector3d multiples = (mesh.positions[v].cast<double>() / step).array().round();
+    snapped.push_back((multiples * step).cast<float>());
+  }
+  return snapped;
+}
+
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

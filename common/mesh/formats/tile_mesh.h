@@ -36,5 +36,9 @@ TileMesh LeafMesh(const MeshRows& mesh, const TileTree& tree, const Tile& leaf);
 // depths: the border may need more faces than that.
 TileMesh ParentMesh(const std::vector<TileMesh>& children, const TileTree& tree, const Tile& parent, size_t max_faces);
 
+// Positions on the lattice of the tile (TileTree::LatticeStep), and on the border on that of the coarsest tile that has
+// the vertex on its border: the same in all tiles that have it there.
+std::vector<Eigen::Vector3f> SnappedPositions(const TileMesh& mesh, const TileTree& tree, const Tile& tile);
+
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -137,6 +137,25 @@ TEST_F(TileMeshTest, ParentsHaveFewerFacesAndAnErrorThatHolds) {
   }
 }
 
+TEST_F(TileMeshTest, SnappedBordersAreTheSameInAllTiles) {
+  std::map<uint32_t, Eigen::Vector3f> border;
+  size_t met_again = 0;
+  for (size_t t = 0; t < tiles_.size(); ++t) {
+    const std::vector<Eigen::Vector3f> snapped = SnappedPositions(tiles_[t], *tree_, tile(t));
+    for (size_t v = 0; v < snapped.size(); ++v) {
+      const double step = tree_->LatticeStep(tile(t).depth);
+      const Eigen::Vector3d multiples = snapped[v].cast<double>() / step;
+      EXPECT_EQ(multiples, Eigen::Vector3d(multiples.array().round()));
+      EXPECT_LE((snapped[v] - tiles_[t].positions[v]).norm(), tree_->LatticeStep(0));
+      if (tiles_[t].common_depth[v] >= tile(t).depth) continue;
+      const auto [known, is_new] = border.try_emplace(tiles_[t].vertices[v], snapped[v]);
+      EXPECT_EQ(known->second, snapped[v]);
+      if (!is_new) ++met_again;
+    }
+  }
+  EXPECT_GT(met_again, 1000U);
+}
+
 TEST_F(TileMeshTest, AMeshOfOnePointIsOneLeaf) {
   TriangleMesh point;
   point.positions.assign(3, Eigen::Vector3f::Constant(7));

@@ -41,6 +41,11 @@ absl::StatusOr<TileTree> TileTree::Build(const MeshRows& mesh, size_t max_faces,
   return tree;
 }
 
+double TileTree::LatticeStep(int depth) const {
+  // Faces reach out of their cubes: half of the numbers of 16 bits are for that.
+  return std::exp2(std::ceil(std::log2(size_ / (1 << 15))) - depth);
+}
+
 TileTree::Code TileTree::CodeOf(const Eigen::Vector3d& x) const {
   constexpr double kCells = 1 << kMaxDepth;
   Code code = 0;

@@ -44,6 +44,9 @@ class TileTree {
   const Eigen::Vector3d& low() const { return low_; }  // corner of the root, less the mesh's offset
   double CubeSize(int depth) const { return std::ldexp(size_, -depth); }
 
+  // Steps of the lattices that compressed positions lie on: a power of two, half as large with each level.
+  double LatticeStep(int depth) const;
+
   static constexpr int kMaxDepth = 19;
 
  private:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <system_error>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "common/base/status_macros.h"
 #include "common/json/json_text.h"
 #include "common/mesh/formats/glb.h"
+#include "common/mesh/formats/glb_compression.h"
 #include "common/mesh/formats/tile_mesh.h"
 #include "common/mesh/formats/tile_tree.h"
 
@@ -39,10 +41,11 @@ Json DescribeTransform(const Eigen::Vector3d& offset) {
 // Tiles from the leaves up, with what tileset.json says of each.
 class TileWriter {
  public:
-  TileWriter(const MeshRows& mesh, const TileTree& tree, size_t max_tile_faces, std::string folder, std::string uri)
+  TileWriter(const MeshRows& mesh, const TileTree& tree, const TilesetOptions& options, std::string folder,
+             std::string uri)
       : mesh_(mesh),
         tree_(tree),
-        max_tile_faces_(max_tile_faces),
+        options_(options),
         folder_(std::move(folder)),
         uri_(std::move(uri)),
         descriptions_(tree.tiles().size()) {}
@@ -55,8 +58,8 @@ class TileWriter {
       MW_ASSIGN_OR_RETURN(children.emplace_back(), Write(child));
     }
     TileMesh mesh =
-        tile.is_leaf() ? LeafMesh(mesh_, tree_, tile) : ParentMesh(children, tree_, tile, max_tile_faces_ / 2);
-    MW_RETURN_IF_ERROR(WriteContent(mesh, folder_ + "/" + tile.name + kContentEnding));
+        tile.is_leaf() ? LeafMesh(mesh_, tree_, tile) : ParentMesh(children, tree_, tile, options_.max_tile_faces / 2);
+    MW_RETURN_IF_ERROR(WriteContent(tile, mesh));
     Describe(tile, mesh, descriptions_[number]);
     return mesh;
   }
@@ -64,16 +67,41 @@ class TileWriter {
   Json& description(size_t number) { return descriptions_[number]; }
 
  private:
-  static absl::Status WriteContent(const TileMesh& tile, const std::string& path) {
+  // Of 16 bits where faces do not reach far out of the cube; floats where they do.
+  glb::PositionLattice LatticeOf(const Tile& tile, const Eigen::AlignedBox3d& box) const {
+    const double step = tree_.LatticeStep(tile.depth);
+    // Vertices of the border are on coarser lattices, the coarsest of which is that of the root's children.
+    const double margin = tree_.LatticeStep(1);
+    if ((box.sizes().maxCoeff() + 2 * margin) / step > std::numeric_limits<uint16_t>::max() - 1) return {};
+    return {.origin = ((box.min().array() - margin) / step).floor() * step, .step = step};
+  }
+
+  absl::Status WriteContent(const Tile& tile, const TileMesh& shown) const {
+    const std::string path = folder_ + "/" + tile.name + kContentEnding;
+    if (options_.compressed && !shown.faces.empty()) {
+      const glb::PositionLattice lattice = LatticeOf(tile, shown.box);
+      return glb::WriteCompressed({.positions = SnappedPositions(shown, tree_, tile),
+                                   .normals = {},
+                                   .colors = shown.colors,
+                                   .texture_coordinates = {},
+                                   .faces = shown.faces},
+                                  lattice, Eigen::Vector3d::Zero(), path);
+    }
     TriangleMesh mesh;
-    mesh.positions = tile.positions;
-    mesh.colors = tile.colors;
-    mesh.faces = tile.faces;
+    mesh.positions = shown.positions;
+    mesh.colors = shown.colors;
+    mesh.faces = shown.faces;
     return WriteGlb(mesh, path);
   }
 
+  // By as much for every tile, so that children stay in their parents.
+  Eigen::AlignedBox3d GrownByRounding(const Eigen::AlignedBox3d& box) const {
+    const Eigen::Vector3d most = Eigen::Vector3d::Constant(tree_.LatticeStep(0) / 2);
+    return {box.min() - most, box.max() + most};
+  }
+
   void Describe(const Tile& tile, const TileMesh& mesh, Json& description) {
-    description["boundingVolume"] = DescribeBox(mesh.box);
+    description["boundingVolume"] = DescribeBox(options_.compressed ? GrownByRounding(mesh.box) : mesh.box);
     description["geometricError"] = mesh.error;
     description["refine"] = "REPLACE";
     description["content"] = {{"uri", absl::StrCat(uri_, "/", tile.name, kContentEnding)}};
@@ -82,7 +110,7 @@ class TileWriter {
 
   const MeshRows& mesh_;
   const TileTree& tree_;
-  const size_t max_tile_faces_;
+  const TilesetOptions options_;
   const std::string folder_;
   const std::string uri_;  // of the folder, from tileset.json
   std::vector<Json> descriptions_;
@@ -141,7 +169,7 @@ absl::Status ReplaceFolder(const std::string& from, const fs::path& to) {
 
 }  // namespace
 
-absl::Status WriteTileset(const MeshRows& mesh, const std::string& path, size_t max_tile_faces) {
+absl::Status WriteTileset(const MeshRows& mesh, const std::string& path, const TilesetOptions& options) {
   if (mesh.faces() == 0) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": the mesh has 0 faces, 3D Tiles expect at least 1"));
   }
@@ -153,8 +181,8 @@ absl::Status WriteTileset(const MeshRows& mesh, const std::string& path, size_t 
   fs::create_directories(partial.path(), error);
   if (error) return SystemError(partial.path(), error);
 
-  MW_ASSIGN_OR_RETURN(const TileTree tree, TileTree::Build(mesh, max_tile_faces, partial.path()));
-  TileWriter writer(mesh, tree, max_tile_faces, partial.path(), folder_name);
+  MW_ASSIGN_OR_RETURN(const TileTree tree, TileTree::Build(mesh, options.max_tile_faces, partial.path()));
+  TileWriter writer(mesh, tree, options, partial.path(), folder_name);
   MW_ASSIGN_OR_RETURN(const TileMesh root, writer.Write(0));
   if (mesh.has_offset()) writer.description(0)["transform"] = DescribeTransform(mesh.offset());
   const Json tileset = {{"asset", {{"version", "1.1"}, {"generator", "Meshwright"}}},

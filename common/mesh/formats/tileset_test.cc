@@ -1,6 +1,7 @@
 #include "common/mesh/formats/tileset.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -32,7 +33,7 @@ class TilesetTest : public testing::Test {
   TilesetTest() : mesh_(MeshOfSurface(RandomSurface(5, SmallCamera(80, 60), 1, 0.95, 0.95))) {}
 
   json Write(const std::string& name = "set/tileset.json") {
-    const absl::Status status = WriteTileset(MeshRows(mesh_), folder_ / name, kMaxFaces);
+    const absl::Status status = WriteTileset(MeshRows(mesh_), folder_ / name, {.max_tile_faces = kMaxFaces});
     EXPECT_TRUE(status.ok()) << status;
     return json::parse(*ReadFile(folder_ / name));
   }
@@ -164,6 +165,45 @@ TEST_F(TilesetTest, TheSameMeshGivesTheSameBytesAndReplacesWhatWasThere) {
   mesh_ = whole;
   Write("b/tileset.json");
   EXPECT_EQ(bytes("a"), bytes("b"));
+}
+
+TEST_F(TilesetTest, CompressedContentsLieInTheirBoxes) {
+  const auto path = folder_ / "set/tileset.json";
+  ASSERT_TRUE(WriteTileset(MeshRows(mesh_), path, {.max_tile_faces = kMaxFaces, .compressed = true}).ok());
+  const json root = json::parse(*ReadFile(path))["root"];
+  ForEach(root, root, [&](const json& tile, const json& parent) {
+    const Glb glb = SplitGlb(*ReadFile(folder_ / ("set/" + tile["content"]["uri"].get<std::string>())));
+    const json& node = glb.description["nodes"][0];
+    const json& positions = glb.description["accessors"][0];
+    // Floats where faces reach far out of their cube.
+    const auto translation = node.value("translation", std::vector<double>(3, 0));
+    const double step = node.value("scale", std::vector<double>(3, 1))[0];
+    const auto place = [&](const std::vector<double>& numbers) -> Eigen::Vector3d {
+      const Eigen::Vector3d y_up(translation[0] + step * numbers[0], translation[1] - step * numbers[1],
+                                 translation[2] - step * numbers[2]);
+      return {y_up.x(), -y_up.z(), y_up.y()};
+    };
+    const Eigen::AlignedBox3d box = BoxOf(tile);
+    EXPECT_TRUE(box.contains(place(positions["min"])));
+    EXPECT_TRUE(box.contains(place(positions["max"])));
+    EXPECT_TRUE(BoxOf(parent).extend(box).sizes().isApprox(BoxOf(parent).sizes(), 1e-9));
+  });
+}
+
+TEST_F(TilesetTest, DustIsNotSeenFromAfar) {
+  mesh_ = {};
+  for (uint32_t i = 0; i < 2 * kMaxFaces; ++i) {
+    const auto angle = static_cast<float>(i);
+    const Eigen::Vector3f x(std::cos(angle), std::sin(angle), 0.01F * angle);
+    for (int k = 0; k < 3; ++k) mesh_.positions.push_back(x + 1e-5F * Eigen::Vector3f::Unit(k));
+    mesh_.faces.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  for (const bool compressed : {false, true}) {
+    const auto path = folder_ / "set/tileset.json";
+    ASSERT_TRUE(WriteTileset(MeshRows(mesh_), path, {.max_tile_faces = kMaxFaces, .compressed = compressed}).ok());
+    const Glb root = SplitGlb(*ReadFile(folder_ / "set/tileset.tiles/r.glb"));
+    EXPECT_FALSE(root.description.contains("meshes"));
+  }
 }
 
 TEST_F(TilesetTest, NamesNeedNoEscapes) {
