@@ -54,7 +54,11 @@ TEST_P(SameMeshTest, AsThroughColmapsText) {
   const std::string scene = folder / "scene";
   fs::create_directories(scene);
   WriteScene(scene, writer.write(SmallScene()));
-  fs::create_symlink(SharedScene("small") + "/images", scene + "/images");
+  for (const SceneView& view : SmallScene().views) {
+    const fs::path picture = fs::path(scene) / PicturePath(writer, view.name);
+    fs::create_directories(picture.parent_path());
+    fs::create_symlink(SharedScene("small") + "/images/" + view.name, picture);
+  }
   std::vector<std::string> arguments = With({"reconstruct", scene, "-o", folder / "mesh.ply"}, kQuick);
   if (!writer.has_intrinsics) {
     const Lens& lens = SmallScene().views[0].lens;

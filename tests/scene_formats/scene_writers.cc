@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/check.h"
+#include "common/base/little_endian.h"
 
 namespace meshwright {
 namespace {
@@ -507,6 +508,85 @@ Matrix3d NewApplied() {
   return m;
 }
 
+template <typename... Values>
+void AppendBinary(std::string& bytes, Values... values) {
+  (AppendLittleEndian(values, bytes), ...);
+}
+
+SceneFiles AsColmapBinary(const Scene& scene) {
+  SceneFiles files;
+  std::string& cameras = files["sparse/0/cameras.bin"];
+  std::string& images = files["sparse/0/images.bin"];
+  AppendBinary(cameras, uint64_t{scene.views.size()});
+  AppendBinary(images, uint64_t{scene.views.size()});
+  for (uint32_t i = 0; i < scene.views.size(); ++i) {
+    const Lens& lens = scene.views[i].lens;
+    const bool is_pinhole = lens.model == Lens::Model::kPinhole;
+    constexpr int32_t kPinholeModel = 1;
+    constexpr int32_t kFullOpenCvModel = 6;
+    AppendBinary(cameras, i + 1, is_pinhole ? kPinholeModel : kFullOpenCvModel, int64_t{lens.width},
+                 int64_t{lens.height}, lens.fx, lens.fy, lens.cx, lens.cy);
+    const Coefficients c(lens);
+    if (!is_pinhole) AppendBinary(cameras, c.k1, c.k2, c.p1, c.p2, c.k3, 0.0, 0.0, 0.0);
+    const Eigen::Quaterniond q(scene.views[i].cam_from_world.rotation);
+    const Vector3d& t = scene.views[i].cam_from_world.translation;
+    AppendBinary(images, i + 1, q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z(), i + 1);
+    images.append(scene.views[i].name.c_str(), scene.views[i].name.size() + 1);
+    AppendBinary(images, uint64_t{0});
+  }
+  std::string& points = files["sparse/0/points3D.bin"];
+  AppendBinary(points, uint64_t{scene.points.size()});
+  for (uint64_t p = 0; p < scene.points.size(); ++p) {
+    const SparsePoint& point = scene.points[p];
+    const Vector3d& x = point.x_in_world;
+    AppendBinary(points, p + 1, x.x(), x.y(), x.z(), point.rgb[0], point.rgb[1], point.rgb[2], 0.5,
+                 uint64_t{point.seen_by.size()});
+    for (const CameraIndex camera : point.seen_by) AppendBinary(points, static_cast<uint32_t>(camera + 1), uint32_t{0});
+  }
+  return files;
+}
+
+// Centres of pixels are at integers.
+Matrix3d IntegerCalibration(const Lens& lens) {
+  Matrix3d k = Matrix3d::Identity();
+  k(0, 0) = lens.fx;
+  k(1, 1) = lens.fy;
+  k(0, 2) = lens.cx - 0.5;
+  k(1, 2) = lens.cy - 0.5;
+  return k;
+}
+
+SceneFiles AsMiddlebury(const Scene& scene) {
+  std::string text = absl::StrCat(scene.views.size(), "\n");
+  for (const SceneView& view : scene.views) {
+    absl::StrAppend(&text, view.name, " ", Rows(IntegerCalibration(view.lens)), " ", Rows(view.cam_from_world.rotation),
+                    " ", Line(view.cam_from_world.translation), "\n");
+  }
+  return {{"scene_par.txt", text}};
+}
+
+SceneFiles AsStrecha(const Scene& scene) {
+  SceneFiles files;
+  for (const SceneView& view : scene.views) {
+    files["cameras/" + view.name + ".camera"] =
+        absl::StrCat(Rows(IntegerCalibration(view.lens), "\n"), "\n0 0 0\n", Rows(WorldFromCam(view), "\n"), "\n",
+                     Line(CenterOf(view)), "\n", view.lens.width, " ", view.lens.height, "\n");
+  }
+  return files;
+}
+
+SceneFiles AsSevenScenes(const Scene& scene) {
+  SceneFiles files;
+  for (const SceneView& view : scene.views) {
+    std::string text;
+    for (int row = 0; row < 3; ++row) {
+      absl::StrAppend(&text, Line(WorldFromCam(view).row(row)), " ", Digits(CenterOf(view)[row]), "\n");
+    }
+    files[view.name.substr(0, view.name.find('.')) + ".pose.txt"] = text + "0 0 0 1\n";
+  }
+  return files;
+}
+
 constexpr LensLimits kBrown = {.radial = 3, .tangential = true};
 constexpr LensLimits kPinhole = {};
 
@@ -514,6 +594,7 @@ constexpr LensLimits kPinhole = {};
 
 const std::vector<SceneWriter>& SceneWriters() {
   static const auto* const writers = new std::vector<SceneWriter>{
+      {"colmap-binary", "", AsColmapBinary, kBrown},
       {"opensfm", "", AsOpenSfm, kBrown},
       {"alicevision", "1.2.11", [](const Scene& scene) { return AsAliceVision(scene, 11); }, kBrown},
       {"alicevision", "1.2.5", [](const Scene& scene) { return AsAliceVision(scene, 5); }, kBrown},
@@ -535,10 +616,17 @@ const std::vector<SceneWriter>& SceneWriters() {
       {"bundler", "", AsBundler, {.two_focals = false, .free_center = false, .radial = 2}},
       {"nvm", "", AsNvm, {.two_focals = false, .free_center = false}},
       {"mvsnet", "", AsMvsNet, kPinhole, false},
+      {"middlebury", "", AsMiddlebury, kPinhole, false, true, 1e-9, ""},
+      {"strecha", "", AsStrecha, kPinhole, false},
+      {"7-scenes", "", AsSevenScenes, kPinhole, false, false, 1e-9, "", ".color.png"},
       {"tum", "", AsTum, kPinhole, false, false},
       {"tanks-and-temples", "", AsTanksAndTemples, kPinhole, false, false},
   };
   return *writers;
+}
+
+std::string PicturePath(const SceneWriter& writer, const std::string& name) {
+  return absl::StrCat(writer.picture_folder, name.substr(0, name.rfind('.')), writer.picture_ending);
 }
 
 Scene SmallSceneWithin(const LensLimits& limits) {
@@ -574,7 +662,7 @@ Scene SmallSceneWithin(const LensLimits& limits) {
 
 SceneFiles SmallSceneAs(const SceneWriter& writer) {
   SceneFiles files = writer.write(SmallSceneWithin(writer.limits));
-  for (const char* name : {"a.png", "b.png", "c.png"}) files[std::string("images/") + name] = SmallPicture();
+  for (const char* name : {"a.png", "b.png", "c.png"}) files[PicturePath(writer, name)] = SmallPicture();
   return files;
 }
 

@@ -21,13 +21,19 @@ struct LensLimits {
 struct SceneWriter {
   const char* format;  // of SceneFormats()
   const char* variant;
-  SceneFiles (*write)(const Scene& scene);  // all but the pictures, which are in images/
+  SceneFiles (*write)(const Scene& scene);  // all but the pictures
   LensLimits limits;
   bool has_points = true;  // with the cameras that see them
   bool has_intrinsics = true;
   double point_digits = 1e-9;  // of coordinates, relative
+  // Where its pictures are, and how their names end in place of ".png".
+  const char* picture_folder = "images/";
+  const char* picture_ending = ".png";
 };
 const std::vector<SceneWriter>& SceneWriters();
+
+// Path within the scene's folder of the picture of a view, which is called NAME.png.
+std::string PicturePath(const SceneWriter& writer, const std::string& name);
 
 // Three cameras, a.png, b.png and c.png of kSmallWidth x kSmallHeight px, and points that they see.
 Scene SmallSceneWithin(const LensLimits& limits);
