@@ -21,7 +21,7 @@ extern "C" void OnStopDuringCameras(int signal) { stop_signal = signal; }
 std::string Counts(const CameraProgress& progress) {
   std::string counts = progress.total > 0 ? absl::StrCat("  ", progress.done, "/", progress.total) : std::string();
   if (progress.seconds_left >= 0 && progress.done < progress.total) {
-    absl::StrAppend(&counts, "  ETA ", FormatDuration(progress.seconds_left));
+    absl::StrAppend(&counts, "  about ", FormatDuration(progress.seconds_left), " left");
   }
   return counts;
 }

@@ -5,6 +5,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "program/console.h"
@@ -13,8 +14,28 @@ namespace meshwright {
 namespace {
 
 constexpr int kBarWidth = 24;
-constexpr size_t kRecentCameras = 12;
 constexpr int kLinesPerStage = 50;
+// A stage that takes longer says how far it is.
+constexpr absl::Duration kLongestSilence = absl::Seconds(10);
+
+// "about 3:20 left"; "" while nothing can be said, and of the last seconds.
+std::string Remaining(const LocalProgress& progress) {
+  if (!(progress.seconds_left >= 1)) return "";
+  return absl::StrCat("about ", FormatDuration(progress.seconds_left), " left");
+}
+
+// 0: not known.
+size_t TerminalColumns(std::FILE* stream) {
+  winsize size = {};
+  const int descriptor = ::fileno(stream);
+  return descriptor >= 0 && ::ioctl(descriptor, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
+
+// The mesh comes in thousandths: a number that nobody counts.
+std::string Done(const LocalProgress& progress) {
+  if (progress.stage != LocalStage::kJoining) return absl::StrCat(progress.done, "/", progress.total);
+  return absl::StrCat(progress.total > 0 ? int64_t{100} * progress.done / progress.total : 0, "%");
+}
 
 std::string Shares(const LocalProgress& progress) {
   return absl::StrCat("rays: ", DescribeShares(progress.share_covered, progress.share_grown, progress.share_accepted));
@@ -44,10 +65,7 @@ void ProgressDisplay::Show(const LocalProgress& progress) {
     End();
     stage_ = static_cast<int>(progress.stage);
     last_line_done_ = -1;
-    recent_.clear();
   }
-  if (recent_.empty() || recent_.back().first < progress.done) recent_.emplace_back(progress.done, clock_.Now());
-  if (recent_.size() > kRecentCameras) recent_.pop_front();
   if (style_ == Style::kBar) {
     ShowBar(progress);
   } else {
@@ -56,23 +74,15 @@ void ProgressDisplay::Show(const LocalProgress& progress) {
   std::fflush(stream_);
 }
 
-std::string ProgressDisplay::Remaining(const LocalProgress& progress) const {
-  if (recent_.size() < 2) return "";
-  const auto& [first_done, first_time] = recent_.front();
-  const double seconds = absl::ToDoubleSeconds(clock_.Now() - first_time);
-  const double left = seconds / (recent_.back().first - first_done) * (progress.total - progress.done);
-  return absl::StrCat("ETA ", FormatDuration(left));
-}
-
 void ProgressDisplay::ShowBar(const LocalProgress& progress) {
   const int filled = progress.total > 0 ? kBarWidth * progress.done / progress.total : 0;
   std::string line =
-      absl::StrFormat("%-20s [%s%s] %d/%d", NameOf(progress.stage), std::string(static_cast<size_t>(filled), '#'),
-                      std::string(static_cast<size_t>(kBarWidth - filled), '.'), progress.done, progress.total);
-  if (progress.stage == LocalStage::kCameras) {
-    absl::StrAppend(&line, "  ", Shares(progress));
-    if (progress.done < progress.total) absl::StrAppend(&line, "  ", Remaining(progress));
-  }
+      absl::StrFormat("%-20s [%s%s] %s", NameOf(progress.stage), std::string(static_cast<size_t>(filled), '#'),
+                      std::string(static_cast<size_t>(kBarWidth - filled), '.'), Done(progress));
+  if (const std::string left = Remaining(progress); !left.empty()) absl::StrAppend(&line, "  ", left);
+  if (progress.stage == LocalStage::kCameras) absl::StrAppend(&line, "  ", Shares(progress));
+  // What is wider than the terminal would go on in a second line, and that would stay.
+  if (const size_t columns = TerminalColumns(stream_); columns > 0) line.resize(std::min(line.size(), columns - 1));
   std::fprintf(stream_, "\r\033[K%s", line.c_str());
   drawn_ = true;
 }
@@ -83,19 +93,23 @@ void ProgressDisplay::ShowLine(const LocalProgress& progress) {
   const bool quick_stage = progress.stage != LocalStage::kCameras;
   const bool first = last_line_done_ < 0;
   const bool last = progress.done == progress.total;
-  if (!first && !last && (quick_stage || progress.done < last_line_done_ + stride)) return;
-  if (progress.done == last_line_done_ || (quick_stage && !first)) return;
+  const bool is_silent = clock_.Uptime() - last_line_at_ >= kLongestSilence;
+  if (progress.done == last_line_done_ || (quick_stage && !first && !is_silent)) return;
+  if (!quick_stage && !first && !last && progress.done < last_line_done_ + stride) return;
   last_line_done_ = progress.done;
+  last_line_at_ = clock_.Uptime();
+  const std::string remaining = Remaining(progress);
+  const std::string left = remaining.empty() ? "" : absl::StrCat("  ", remaining);
   if (quick_stage) {
-    std::fprintf(stream_, "%s\n", NameOf(progress.stage).c_str());
+    const std::string done = first ? "" : absl::StrCat(" ", Done(progress));
+    std::fprintf(stream_, "%s%s%s\n", NameOf(progress.stage).c_str(), done.c_str(), left.c_str());
     return;
   }
   if (first && progress.resumed_from > 0) {
     std::fprintf(stream_, "going on after camera %d\n", progress.resumed_from);
   }
-  const std::string remaining = last ? "" : Remaining(progress);
-  std::fprintf(stream_, "%s %d/%d  %s%s%s\n", NameOf(progress.stage).c_str(), progress.done, progress.total,
-               Shares(progress).c_str(), remaining.empty() ? "" : "  ", remaining.c_str());
+  std::fprintf(stream_, "%s %s  %s%s\n", NameOf(progress.stage).c_str(), Done(progress).c_str(),
+               Shares(progress).c_str(), left.c_str());
 }
 
 std::string DescribeShares(double covered_before, double grown, double accepted) {

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <cstdio>
-#include <deque>
 #include <string>
-#include <utility>
 
 #include <absl/time/time.h>
 
@@ -32,8 +30,6 @@ class ProgressDisplay {
  private:
   void ShowBar(const LocalProgress& progress);
   void ShowLine(const LocalProgress& progress);
-  // From the speed of the last few cameras: later cameras are quicker, they find more that is accepted already.
-  std::string Remaining(const LocalProgress& progress) const;
 
   const Style style_;
   std::FILE* const stream_;
@@ -41,7 +37,7 @@ class ProgressDisplay {
   bool drawn_ = false;
   int stage_ = -1;
   int last_line_done_ = -1;
-  std::deque<std::pair<int, absl::Time>> recent_;  // (cameras done, when)
+  absl::Duration last_line_at_;  // by Clock::Uptime()
 };
 
 // Where the rays of all cameras went, from shares of report.json, in percent that add up to 100: "41.5% covered before,

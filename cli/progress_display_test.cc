@@ -1,5 +1,6 @@
 #include "cli/progress_display.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 
@@ -31,6 +32,7 @@ std::string Written(ProgressDisplay::Style style, int cameras, int resumed_from 
     progress.resumed_from = resumed_from;
     for (progress.done = resumed_from; progress.done <= cameras; ++progress.done) {
       progress.share_grown = 0.25;
+      progress.seconds_left = 10 * (cameras - progress.done);
       display.Show(progress);
       clock.Advance(absl::Seconds(10));
     }
@@ -47,18 +49,45 @@ TEST(ProgressDisplayTest, PlainLinesHaveNoControlCharactersAndAreFew) {
   EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 60);
   EXPECT_THAT(text, HasSubstr("cameras 1000/1000"));
   EXPECT_THAT(text, HasSubstr("25.0% not confirmed"));
-  EXPECT_THAT(text, HasSubstr("ETA "));
+  EXPECT_THAT(text, HasSubstr("about 2:46:40 left"));
 }
 
 TEST(ProgressDisplayTest, TheBarStaysOnItsLineAndKnowsHowLongItTakes) {
   const std::string text = Written(ProgressDisplay::Style::kBar, 10);
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 2);  // two stages
   EXPECT_THAT(text, HasSubstr("[############............] 5/10"));
-  EXPECT_THAT(text, HasSubstr("ETA 0:50"));
+  EXPECT_THAT(text, HasSubstr("about 0:50 left"));
 }
 
 TEST(ProgressDisplayTest, AResumedRunSaysSo) {
   EXPECT_THAT(Written(ProgressDisplay::Style::kLines, 10, 4), HasSubstr("going on after camera 4"));
+}
+
+// The mesh of a large scene takes minutes: whoever reads a log sees that it goes on, and a quick one says one line.
+TEST(ProgressDisplayTest, AStageThatTakesLongSaysHowFarItIs) {
+  const auto written = [](absl::Duration step) {
+    char* text = nullptr;
+    size_t size = 0;
+    std::FILE* stream = open_memstream(&text, &size);
+    ManualClock clock;
+    ProgressDisplay display(ProgressDisplay::Style::kLines, stream, clock);
+    LocalProgress progress = {.stage = LocalStage::kJoining, .total = 1000};
+    for (; progress.done <= progress.total; progress.done += 20) {
+      progress.seconds_left = 60;
+      display.Show(progress);
+      clock.Advance(step);
+    }
+    display.End();
+    std::fclose(stream);
+    std::string lines(text, size);
+    std::free(text);
+    return lines;
+  };
+  const std::string quick = written(absl::Milliseconds(10));
+  EXPECT_EQ(std::count(quick.begin(), quick.end(), '\n'), 1) << quick;
+  const std::string slow = written(absl::Seconds(2));
+  EXPECT_THAT(slow, HasSubstr("joining the mesh 50%  about 1:00 left\n"));
+  EXPECT_EQ(std::count(slow.begin(), slow.end(), '\n'), 11) << slow;
 }
 
 TEST(ProgressDisplayTest, QuietIsQuiet) { EXPECT_EQ(Written(ProgressDisplay::Style::kNone, 10), ""); }

@@ -32,6 +32,14 @@ struct Arguments {
   bool partial = false;
 };
 
+// ", about 3:20 left"; "" while nothing can be said.
+std::string TimeLeft(const v1::Reconstruction& reconstruction) {
+  if (!reconstruction.has_expected_finish_time()) return "";
+  const double seconds = absl::ToDoubleSeconds(absl::FromUnixSeconds(reconstruction.expected_finish_time().seconds()) -
+                                               SystemClock().Now());
+  return seconds < 1 ? "" : absl::StrCat(", about ", FormatDuration(seconds), " left");
+}
+
 void PrintReconstruction(const v1::Reconstruction& reconstruction) {
   const v1::Progress& progress = reconstruction.progress();
   std::printf("%-32s %-10s", reconstruction.id().c_str(), NameOf(reconstruction.state()).c_str());
@@ -44,6 +52,7 @@ void PrintReconstruction(const v1::Reconstruction& reconstruction) {
     std::printf(" cameras %d/%d, %d with workers", progress.cameras_committed(), progress.cameras_total(),
                 progress.jobs_leased());
   }
+  std::printf("%s", TimeLeft(reconstruction).c_str());
   if (progress.cameras_skipped() > 0) std::printf(", %d skipped", progress.cameras_skipped());
   std::printf("%s%s\n", reconstruction.failure().empty() ? "" : " ", reconstruction.failure().c_str());
   for (const std::string& warning : reconstruction.warnings()) std::printf("  %s\n", warning.c_str());
@@ -190,6 +199,10 @@ Json ToJson(const v1::Reconstruction& reconstruction) {
                      {"committed", progress.cameras_committed()},
                      {"skipped", progress.cameras_skipped()},
                      {"with_workers", progress.jobs_leased()}};
+  if (reconstruction.has_expected_finish_time()) {
+    json["expected_finish"] = absl::FormatTime(
+        absl::RFC3339_sec, absl::FromUnixSeconds(reconstruction.expected_finish_time().seconds()), absl::UTCTimeZone());
+  }
   if (reconstruction.state() == v1::RECONSTRUCTION_STATE_DONE) {
     json["mesh"] = {{"vertices", progress.vertices()},
                     {"faces", progress.faces()},
@@ -210,11 +223,11 @@ int WatchUntilOver(const ServiceArguments& arguments, ServiceClient& client, con
     since_answer = Stopwatch();
     if (arguments.output.quiet || !news) return;
     if (!now.stage().empty()) {
-      std::fprintf(stderr, "%s: %s\n", id.c_str(), now.stage().c_str());
+      std::fprintf(stderr, "%s: %s%s\n", id.c_str(), now.stage().c_str(), TimeLeft(now).c_str());
       return;
     }
-    std::fprintf(stderr, "%s: %s, cameras %d/%d\n", id.c_str(), NameOf(now.state()).c_str(),
-                 now.progress().cameras_committed(), now.progress().cameras_total());
+    std::fprintf(stderr, "%s: %s, cameras %d/%d%s\n", id.c_str(), NameOf(now.state()).c_str(),
+                 now.progress().cameras_committed(), now.progress().cameras_total(), TimeLeft(now).c_str());
   };
   absl::Status status = client.Watch(id, tell);
   // It has answered before: it is being restarted, or the network is away for a while.

@@ -1,8 +1,10 @@
 #include "common/mesh/border_stitching.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <queue>
 #include <tuple>
 
@@ -26,6 +28,46 @@ constexpr double kMinFlatShare = 0.9;
 constexpr double kMinSheetCosine = 0.5;
 
 double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// Edges that one thread looks at before it takes the next ones, and triangles between two looks at how far it is.
+constexpr int64_t kEdgesAtOnce = 1024;
+constexpr size_t kPopsAStep = 4096;
+// Of BorderStitcher::kSteps, by the time that they take.
+constexpr int kStepsOfLooking = 25;
+constexpr int kStepsOfStitching = 25;
+
+// Calls `step` as often as a share of `total` asks for that is reached. Thread-safe.
+class Steps {
+ public:
+  Steps(int total, const std::function<void()>& step) : total_(total), step_(step) {}
+
+  void Reach(double share) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (; done_ < static_cast<int>(share * total_); ++done_) step_();
+  }
+
+ private:
+  const int total_;
+  const std::function<void()>& step_;
+  std::mutex mutex_;
+  int done_ = 0;
+};
+
+// radius < 2^level.
+int LevelOf(double radius) {
+  int level = 0;
+  std::frexp(radius, &level);
+  return level;
+}
+
+std::array<int32_t, 3> CellOf(const Eigen::Vector3d& x, double width) {
+  std::array<int32_t, 3> cell = {};
+  for (int k = 0; k < 3; ++k) {
+    // Far beyond any scene the cells melt into one; that costs time only.
+    cell[static_cast<size_t>(k)] = static_cast<int32_t>(std::clamp(std::floor(x[k] / width), -1e9, 1e9));
+  }
+  return cell;
+}
 
 // Whether the open segments meet in one point that is inside both.
 bool Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
@@ -69,12 +111,11 @@ BorderStitcher::BorderStitcher(std::vector<BorderVertex> vertices,
   for (const auto& [v, w] : inner_edges) AddEdge(v, w);
 }
 
-// Whether an open edge crosses the segment.
-bool BorderStitcher::IsBlocked(const Eigen::Vector2d& from, int32_t from_vertex, const Eigen::Vector2d& to,
-                               int32_t to_vertex) const {
-  return std::ranges::any_of(blockers_, [&](const Segment& s) {
-    return s.from_vertex != from_vertex && s.from_vertex != to_vertex && s.to_vertex != from_vertex &&
-           s.to_vertex != to_vertex && Cross(from, to, s.from, s.to);
+bool BorderStitcher::IsBlocked(absl::Span<const Segment> blockers, const Segment& segment) {
+  return std::ranges::any_of(blockers, [&](const Segment& s) {
+    return s.from_vertex != segment.from_vertex && s.from_vertex != segment.to_vertex &&
+           s.to_vertex != segment.from_vertex && s.to_vertex != segment.to_vertex &&
+           Cross(segment.from, segment.to, s.from, s.to);
   });
 }
 
@@ -105,35 +146,32 @@ void BorderStitcher::Close(Corner& corner) {
   --open_at_vertex_[static_cast<size_t>(corner.vertex)];
 }
 
-void BorderStitcher::FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found) {
-  int level = 0;
-  std::frexp(radius, &level);  // radius < 2^level
+void BorderStitcher::MakeGrid(int level) {
+  const auto [grid, is_new] = grids_.try_emplace(level);
+  if (!is_new) return;
   const double width = std::ldexp(1.0, level);
-  const auto cell_of = [&](const Eigen::Vector3d& at) {
-    std::array<int32_t, 3> cell = {};
-    for (int k = 0; k < 3; ++k) {
-      // Far beyond any scene the cells melt into one; that costs time only.
-      cell[static_cast<size_t>(k)] = static_cast<int32_t>(std::clamp(std::floor(at[k] / width), -1e9, 1e9));
-    }
-    return cell;
-  };
-  auto [grid, is_new] = grids_.try_emplace(level);
-  if (is_new) {
-    for (size_t v = 0; v < vertices_.size(); ++v) {
-      if (open_at_vertex_[v] > 0 && vertices_[v].spacing <= width) {
-        grid->second[cell_of(vertices_[v].position.cast<double>())].push_back(static_cast<int32_t>(v));
-      }
+  for (size_t v = 0; v < vertices_.size(); ++v) {
+    if (open_at_vertex_[v] > 0 && vertices_[v].spacing <= width) {
+      grid->second[CellOf(vertices_[v].position.cast<double>(), width)].push_back(static_cast<int32_t>(v));
     }
   }
+}
+
+// The grid of LevelOf(radius) is there. As long as no vertex has lost its last open corner since that was made, nothing
+// is written, and several threads may call at the same time.
+void BorderStitcher::FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found) {
+  const int level = LevelOf(radius);
+  const double width = std::ldexp(1.0, level);
+  auto& grid = grids_.at(level);
   found.clear();
-  const std::array<int32_t, 3> low = cell_of(x - Eigen::Vector3d::Constant(radius));
-  const std::array<int32_t, 3> high = cell_of(x + Eigen::Vector3d::Constant(radius));
+  const std::array<int32_t, 3> low = CellOf(x - Eigen::Vector3d::Constant(radius), width);
+  const std::array<int32_t, 3> high = CellOf(x + Eigen::Vector3d::Constant(radius), width);
   std::array<int32_t, 3> at = low;
   for (at[2] = low[2]; at[2] <= high[2]; ++at[2]) {
     for (at[1] = low[1]; at[1] <= high[1]; ++at[1]) {
       for (at[0] = low[0]; at[0] <= high[0]; ++at[0]) {
-        const auto cell = grid->second.find(at);
-        if (cell == grid->second.end()) continue;
+        const auto cell = grid.find(at);
+        if (cell == grid.end()) continue;
         std::vector<int32_t>& members = cell->second;
         for (size_t m = 0; m < members.size();) {
           const int32_t v = members[m];
@@ -160,7 +198,8 @@ bool BorderStitcher::InGap(int32_t corner, int32_t vertex, const Scope& scope) c
   return InSector(NormalFor(at.vertex, scope), Position(previous) - x, Position(vertex) - x, Position(next) - x);
 }
 
-bool BorderStitcher::Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope) const {
+bool BorderStitcher::Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope,
+                          const Scratch& scratch) const {
   const int32_t end = At(edge).next;
   const int32_t c = VertexOf(corner);
   const bool after = At(end).next == corner;
@@ -182,11 +221,17 @@ bool BorderStitcher::Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, 
     if (!InSector(NormalFor(c, scope), frame.b - x, frame.a - x, next - x)) return false;
   }
   const Eigen::Vector2d at = frame.Project(x);
-  if (!before && IsBlocked({0, 0}, frame.a_vertex, at, c)) return false;
-  return after || !IsBlocked(frame.Project(frame.b), frame.b_vertex, at, c);
+  if (!before && IsBlocked(scratch.blockers, {{0, 0}, at, frame.a_vertex, c})) return false;
+  return after || !IsBlocked(scratch.blockers, {frame.Project(frame.b), at, frame.b_vertex, c});
 }
 
-BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& scope) {
+// How far around the middle of an edge vertices matter.
+double BorderStitcher::SearchRadius(int32_t edge, const Scope& scope) const {
+  const double spacing = std::max<double>(Vertex(VertexOf(edge)).spacing, Vertex(VertexOf(At(edge).next)).spacing);
+  return 2 * scope.reach * spacing;
+}
+
+BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& scope, Scratch& scratch) {
   EdgeFrame frame;
   frame.a_vertex = VertexOf(edge);
   frame.b_vertex = VertexOf(At(edge).next);
@@ -198,15 +243,14 @@ BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& sco
   frame.y_axis = (frame.b - frame.a).cross(frame.normal).normalized();
   frame.x_axis = frame.normal.cross(frame.y_axis).normalized();
   const double spacing = std::max<double>(Vertex(frame.a_vertex).spacing, Vertex(frame.b_vertex).spacing);
-  const double reach = scope.reach * spacing;
   const std::vector<int32_t>* around = scope.members;
   if (around == nullptr) {
-    FindNearby(0.5 * (frame.a + frame.b), 2 * reach, nearby_);
-    around = &nearby_;
+    FindNearby(0.5 * (frame.a + frame.b), SearchRadius(edge, scope), scratch.nearby);
+    around = &scratch.nearby;
   }
 
-  blockers_.clear();
-  apexes_.clear();
+  scratch.blockers.clear();
+  scratch.apexes.clear();
   for (const int32_t v : *around) {
     if (!(NormalFor(v, scope).dot(frame.normal) > kMinSheetCosine)) continue;
     const Eigen::Vector3d x = Position(v);
@@ -223,16 +267,16 @@ BorderStitcher::Candidate BorderStitcher::BestFor(int32_t edge, const Scope& sco
       if (!At(corner).open) continue;
       const int32_t next = VertexOf(At(corner).next);
       const Eigen::Vector2d next_at = frame.Project(Position(next));
-      if (at.y() > 0 || next_at.y() > 0) blockers_.push_back({at, next_at, v, next});
+      if (at.y() > 0 || next_at.y() > 0) scratch.blockers.push_back({at, next_at, v, next});
       if (apex.cosine < 1 && apex.cost <= scope.reach) {
         apex.corner = corner;
-        apexes_.push_back(apex);
+        scratch.apexes.push_back(apex);
       }
     }
   }
-  std::ranges::sort(apexes_, {}, [](const Apex& apex) { return std::pair(apex.cosine, apex.corner); });
-  for (const Apex& apex : apexes_) {
-    if (Fits(frame, edge, apex.corner, scope)) return {apex.cost, apex.corner};
+  std::ranges::sort(scratch.apexes, {}, [](const Apex& apex) { return std::pair(apex.cosine, apex.corner); });
+  for (const Apex& apex : scratch.apexes) {
+    if (Fits(frame, edge, apex.corner, scope, scratch)) return {apex.cost, apex.corner};
   }
   return {};
 }
@@ -277,7 +321,30 @@ void BorderStitcher::Apply(int32_t edge, int32_t corner, std::vector<int32_t>& c
   }
 }
 
-void BorderStitcher::Advance(absl::Span<const int32_t> edges, const Scope& scope) {
+BorderStitcher::Candidate BorderStitcher::BestNow(int32_t edge, const Scope& scope) {
+  if (scope.members == nullptr) MakeGrid(LevelOf(SearchRadius(edge, scope)));
+  return BestFor(edge, scope, scratch_);
+}
+
+std::vector<BorderStitcher::Candidate> BorderStitcher::BestForEach(absl::Span<const int32_t> edges, const Scope& scope,
+                                                                   ThreadPool& pool, const Progress& progress) {
+  for (const int32_t edge : edges) {
+    if (At(edge).open) MakeGrid(LevelOf(SearchRadius(edge, scope)));
+  }
+  std::vector<Candidate> best(edges.size());
+  std::atomic<int64_t> done = 0;
+  pool.ParallelFor(static_cast<int64_t>(edges.size()), kEdgesAtOnce, [&](int64_t begin, int64_t end) {
+    Scratch scratch;
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      if (At(edges[i]).open) best[i] = BestFor(edges[i], scope, scratch);
+    }
+    progress(static_cast<double>(done += end - begin) / static_cast<double>(edges.size()));
+  });
+  return best;
+}
+
+void BorderStitcher::Advance(absl::Span<const int32_t> edges, const Scope& scope,
+                             absl::Span<const Candidate> candidates, const Progress& progress) {
   struct Entry {
     Candidate candidate;
     int32_t edge;
@@ -286,33 +353,45 @@ void BorderStitcher::Advance(absl::Span<const int32_t> edges, const Scope& scope
       return std::tie(other.candidate.cost, other.edge, other.next) < std::tie(candidate.cost, edge, next);
     }
   };
-  std::priority_queue<Entry> queue;
-  const auto push = [&](int32_t edge) {
-    if (!At(edge).open) return;
-    const Candidate best = BestFor(edge, scope);
-    if (best.corner >= 0) queue.push({best, edge, At(edge).next});
-  };
-  for (const int32_t edge : edges) push(edge);
+  std::vector<Entry> entries;
+  for (size_t i = 0; i < edges.size(); ++i) {
+    if (candidates[i].corner >= 0) entries.push_back({candidates[i], edges[i], At(edges[i]).next});
+  }
+  std::priority_queue<Entry> queue(std::less<Entry>(), std::move(entries));
   std::vector<int32_t> changed;
-  while (!queue.empty()) {
+  for (size_t popped = 1; !queue.empty(); ++popped) {
+    if (popped % kPopsAStep == 0) {
+      progress(static_cast<double>(popped) / static_cast<double>(popped + queue.size()));
+    }
     const Entry top = queue.top();
     queue.pop();
     if (!At(top.edge).open || At(top.edge).next != top.next) continue;
-    const Candidate best = BestFor(top.edge, scope);
+    const Candidate best = BestNow(top.edge, scope);
     if (best.corner < 0) continue;
     if (best.cost > top.candidate.cost) {
       queue.push({best, top.edge, top.next});
       continue;
     }
     Apply(top.edge, best.corner, changed);
-    for (const int32_t edge : changed) push(edge);
+    for (const int32_t edge : changed) {
+      if (!At(edge).open) continue;
+      const Candidate next = BestNow(edge, scope);
+      if (next.corner >= 0) queue.push({next, edge, At(edge).next});
+    }
   }
 }
 
-void BorderStitcher::StitchNearby(double reach) {
+void BorderStitcher::StitchNearby(double reach, ThreadPool& pool, const std::function<void()>& step) {
   std::vector<int32_t> edges(corners_.size());
   for (size_t i = 0; i < edges.size(); ++i) edges[i] = static_cast<int32_t>(i);
-  Advance(edges, {.reach = reach, .min_normal_cosine = kMinSeamNormalCosine});
+  const Scope scope = {.reach = reach, .min_normal_cosine = kMinSeamNormalCosine};
+  Steps looking(kStepsOfLooking, step);
+  const std::vector<Candidate> candidates =
+      BestForEach(edges, scope, pool, [&](double share) { looking.Reach(share); });
+  looking.Reach(1);
+  Steps stitching(kStepsOfStitching, step);
+  Advance(edges, scope, candidates, [&](double share) { stitching.Reach(share); });
+  stitching.Reach(1);
   grids_.clear();
 }
 
@@ -393,19 +472,29 @@ std::vector<BorderStitcher::Hole> BorderStitcher::FindHoles(double max_width) co
   return holes;
 }
 
-int64_t BorderStitcher::FillHoles(double max_width) {
+int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>& step) {
   const std::vector<Hole> holes = FindHoles(max_width);
   std::vector<int32_t> members;
-  for (const Hole& hole : holes) {
+  std::vector<Candidate> candidates;
+  Steps filling(kSteps - kStepsOfLooking - kStepsOfStitching, step);
+  for (size_t h = 0; h < holes.size(); ++h) {
+    const Hole& hole = holes[h];
+    filling.Reach(static_cast<double>(h) / static_cast<double>(holes.size()));
     members.clear();
     for (const int32_t corner : hole.corners) members.push_back(VertexOf(corner));
     std::ranges::sort(members);
     members.erase(std::unique(members.begin(), members.end()), members.end());
-    Advance(hole.corners, {.reach = std::numeric_limits<double>::infinity(),
-                           .min_normal_cosine = kMinHoleNormalCosine,
-                           .members = &members,
-                           .normal = &hole.normal});
+    const Scope scope = {.reach = std::numeric_limits<double>::infinity(),
+                         .min_normal_cosine = kMinHoleNormalCosine,
+                         .members = &members,
+                         .normal = &hole.normal};
+    candidates.clear();
+    for (const int32_t edge : hole.corners) {
+      candidates.push_back(At(edge).open ? BestNow(edge, scope) : Candidate());
+    }
+    Advance(hole.corners, scope, candidates, [](double) {});
   }
+  filling.Reach(1);
   return std::ranges::count_if(holes, [&](const Hole& hole) {
     return std::ranges::none_of(hole.corners, [&](int32_t corner) { return At(corner).open; });
   });

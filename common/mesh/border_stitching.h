@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include <absl/container/flat_hash_map.h>
 #include <absl/container/flat_hash_set.h>
 #include <absl/types/span.h>
+
+#include "common/base/thread_pool.h"
 
 namespace meshwright {
 
@@ -33,15 +36,18 @@ class BorderStitcher {
   // `inner_edges`: pairs of border vertices that an edge joins which has its two triangles already.
   BorderStitcher(std::vector<BorderVertex> vertices, absl::Span<const std::pair<int32_t, int32_t>> inner_edges);
 
+  // Both of what takes long call `step` now and then, together kSteps times.
+  static constexpr int kSteps = 60;
+
   // Fills gaps wherever circumcircles have a radius of at most `reach` times the vertices' spacing.
-  void StitchNearby(double reach);
+  void StitchNearby(double reach, ThreadPool& pool, const std::function<void()>& step);
 
   // Takes the borders of all vertices with drop[vertex] out of the game.
   void Drop(const std::vector<uint8_t>& drop);
 
   // Fills loops around holes of at most `max_width` times the vertices' spacing, together with the islands in them:
   // slits whatever their rims look like, wider holes where the rims are nearly flat. Returns how many.
-  int64_t FillHoles(double max_width);
+  int64_t FillHoles(double max_width, const std::function<void()>& step);
 
   const std::vector<BorderVertex>& vertices() const { return vertices_; }
   const std::vector<Face>& faces() const { return faces_; }
@@ -82,20 +88,39 @@ class BorderStitcher {
     int32_t from_vertex = 0;
     int32_t to_vertex = 0;
   };
+  // Whether an open edge crosses the segment from one vertex to the other.
+  static bool IsBlocked(absl::Span<const Segment> blockers, const Segment& segment);
   struct EdgeFrame;
   struct Hole;
 
-  Candidate BestFor(int32_t edge, const Scope& scope);
-  bool Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope) const;
+  // Of the edge that is looked at; kept so that its memory is.
+  struct Scratch {
+    std::vector<int32_t> nearby;
+    std::vector<Segment> blockers;
+    std::vector<Apex> apexes;
+  };
+
+  using Progress = std::function<void(double share)>;
+
+  // The triangle to put over an open edge; its grid is there (FindNearby).
+  Candidate BestFor(int32_t edge, const Scope& scope, Scratch& scratch);
+  Candidate BestNow(int32_t edge, const Scope& scope);
+  // Of many edges while nothing changes, on all threads.
+  std::vector<Candidate> BestForEach(absl::Span<const int32_t> edges, const Scope& scope, ThreadPool& pool,
+                                     const Progress& progress);
+  bool Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope, const Scratch& scratch) const;
   bool InGap(int32_t corner, int32_t vertex, const Scope& scope) const;
   // Outwards at a vertex.
   Eigen::Vector3d NormalFor(int32_t v, const Scope& scope) const { return scope.normal ? *scope.normal : Normal(v); }
-  bool IsBlocked(const Eigen::Vector2d& from, int32_t from_vertex, const Eigen::Vector2d& to, int32_t to_vertex) const;
   void Close(Corner& corner);
   bool HasEdge(int32_t v, int32_t w) const;
   void AddEdge(int32_t v, int32_t w);
   void Apply(int32_t edge, int32_t corner, std::vector<int32_t>& changed);
-  void Advance(absl::Span<const int32_t> edges, const Scope& scope);
+  // `candidates`: what BestFor says of each edge now; none for those that are not open.
+  void Advance(absl::Span<const int32_t> edges, const Scope& scope, absl::Span<const Candidate> candidates,
+               const Progress& progress);
+  double SearchRadius(int32_t edge, const Scope& scope) const;
+  void MakeGrid(int level);
   void FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found);
   std::vector<Hole> FindHoles(double max_width) const;
 
@@ -113,10 +138,7 @@ class BorderStitcher {
   absl::flat_hash_set<std::pair<int32_t, int32_t>> edges_;
   // Vertices in cubes of width 2^level; each grid is made when first asked for.
   absl::flat_hash_map<int, absl::flat_hash_map<std::array<int32_t, 3>, std::vector<int32_t>>> grids_;
-  // Of the edge that is looked at; members so that their memory is kept.
-  std::vector<int32_t> nearby_;
-  std::vector<Segment> blockers_;
-  std::vector<Apex> apexes_;
+  Scratch scratch_;
 };
 
 }  // namespace meshwright

@@ -189,18 +189,20 @@ std::vector<std::pair<int32_t, int32_t>> SortedEdges(const std::vector<BorderSti
   return edges;
 }
 
-Joins JoinBorders(PartBorders& borders, const JoinOptions& options, JoinedMeshCounts& counts) {
+Joins JoinBorders(PartBorders& borders, const JoinOptions& options, ThreadPool& pool, JoinProgress& progress,
+                  JoinedMeshCounts& counts) {
   Joins joins;
+  const auto step = [&] { progress.Step(JoinStage::kStitching, BorderStitcher::kSteps); };
   BorderStitcher stitcher(std::move(borders.vertices), borders.inner_edges);
   borders.inner_edges = {};
   stitcher.Drop(LoneTriangles(borders));
-  stitcher.StitchNearby(kStitchReach);
+  stitcher.StitchNearby(kStitchReach, pool, step);
   joins.small = SmallComponents(borders, stitcher.faces(), options.min_component_faces, counts.components_removed);
   std::vector<uint8_t> drop(borders.origins.size());
   for (size_t v = 0; v < drop.size(); ++v) drop[v] = joins.small[static_cast<size_t>(borders.origins[v].component)];
   stitcher.Drop(drop);
   const size_t stitch_faces = stitcher.faces().size();
-  counts.holes_filled = stitcher.FillHoles(options.max_hole_steps);
+  counts.holes_filled = stitcher.FillHoles(options.max_hole_steps, step);
   counts.border_edges_after = stitcher.CountOpenEdges();
 
   joins.faces = stitcher.faces();
@@ -311,10 +313,11 @@ absl::Status JoinOptions::Validate() const {
 
 absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurface& load, const JoinOptions& options,
                                                  const Eigen::Vector3d& offset, const std::string& path,
-                                                 ThreadPool& pool, const std::function<void()>& part_done) {
+                                                 ThreadPool& pool, const JoinListener& listener) {
   MW_RETURN_IF_ERROR(options.Validate());
   JoinedMeshCounts counts;
-  MW_ASSIGN_OR_RETURN(PartBorders borders, FindPartBorders(count, load, pool, part_done));
+  JoinProgress progress(listener);
+  MW_ASSIGN_OR_RETURN(PartBorders borders, FindPartBorders(count, load, pool, progress));
   counts.border_edges_before = static_cast<int64_t>(borders.vertices.size());
   std::vector<int64_t> patches;
   for (size_t i = 0; i < static_cast<size_t>(count); ++i) {
@@ -322,7 +325,7 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
     patches.push_back(static_cast<int64_t>(trimmed.size()));
     counts.patches_trimmed += std::ranges::count(trimmed, true);
   }
-  const Joins joins = JoinBorders(borders, options, counts);
+  const Joins joins = JoinBorders(borders, options, pool, progress, counts);
 
   MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, AttributesWith(offset)));
   PartWriter part_writer(borders, joins, writer);
@@ -341,7 +344,7 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
       counts.faces_simplified += part.faces_simplified;
       counts.area += part.area;
       MW_RETURN_IF_ERROR(part_writer.Append(i, part));
-      part_done();
+      progress.Step(JoinStage::kWriting, count);
     }
   }
   MW_RETURN_IF_ERROR(part_writer.AppendJoins());

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 
 #include <Eigen/Core>
@@ -9,6 +8,7 @@
 #include <absl/status/statusor.h>
 
 #include "common/base/thread_pool.h"
+#include "common/mesh/join_progress.h"
 #include "common/mesh/part_borders.h"
 
 namespace meshwright {
@@ -49,11 +49,11 @@ struct JoinedMeshCounts {
 // on the threads.
 //
 // Loads each surface a few times, a few of them at a time, and keeps the vertices on borders of all of them (some 300
-// bytes each, and 1/4 byte for each patch). `part_done` is called twice per surface, one call at a time. Errors: those
-// of `load` or of PlyStreamWriter, InvalidArgument for options; then no file appears.
+// bytes each, and 1/4 byte for each patch). Errors: those of `load` or of PlyStreamWriter, InvalidArgument for options;
+// then no file appears.
 absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(
     int64_t count, const LoadSurface& load, const JoinOptions& options, const Eigen::Vector3d& offset,
-    const std::string& path, ThreadPool& pool, const std::function<void()>& part_done = [] {});
+    const std::string& path, ThreadPool& pool, const JoinListener& listener = [](double) {});
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

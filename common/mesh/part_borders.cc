@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <mutex>
 #include <optional>
 
 #include "common/base/status_macros.h"
@@ -137,14 +136,14 @@ std::vector<std::pair<int64_t, int64_t>> BatchesOfParts(const std::vector<int64_
 }
 
 absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& load, ThreadPool& pool,
-                                            const std::function<void()>& looked_at) {
+                                            JoinProgress& progress) {
   std::vector<std::optional<Sketch>> sketches(static_cast<size_t>(count));
   std::vector<int64_t> patches(static_cast<size_t>(count));
-  std::mutex mutex;
   MW_RETURN_IF_ERROR(ForEachPart(0, count, pool, [&](int64_t i) -> absl::Status {
     MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load(i));
     sketches[static_cast<size_t>(i)] = Sketch{SurfaceOutline(*surface), CornersOfTriangles(*surface)};
     patches[static_cast<size_t>(i)] = static_cast<int64_t>(surface->patches());
+    progress.Step(JoinStage::kSketching, count);
     return absl::OkStatus();
   }));
   PartBorders borders;
@@ -152,8 +151,7 @@ absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& lo
     std::vector<OnePart> parts(static_cast<size_t>(last - first));
     MW_RETURN_IF_ERROR(ForEachPart(first, last, pool, [&, first = first](int64_t i) -> absl::Status {
       MW_ASSIGN_OR_RETURN(parts[static_cast<size_t>(i - first)], LookAtPart(i, load, sketches, pool));
-      const std::lock_guard<std::mutex> lock(mutex);
-      looked_at();
+      progress.Step(JoinStage::kLooking, count);
       return absl::OkStatus();
     }));
     for (OnePart& part : parts) Append(std::move(part), borders);

@@ -11,6 +11,7 @@
 
 #include "common/base/thread_pool.h"
 #include "common/mesh/border_stitching.h"
+#include "common/mesh/join_progress.h"
 #include "common/surface/sparse_surface.h"
 
 namespace meshwright {
@@ -41,9 +42,9 @@ struct PartBorders {
 };
 
 // Trims accepted surfaces 0 .. count - 1 where an earlier one shows the same and finds the borders of what is left.
-// `looked_at` is called once per surface, one call at a time. Errors: those of `load`.
+// Errors: those of `load`.
 absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& load, ThreadPool& pool,
-                                            const std::function<void()>& looked_at);
+                                            JoinProgress& progress);
 
 // Calls body(i) for first .. last - 1 on all threads. The error of the lowest i, once all are done.
 absl::Status ForEachPart(int64_t first, int64_t last, ThreadPool& pool,

@@ -14,6 +14,7 @@ namespace meshwright {
 namespace {
 
 constexpr size_t kMaxIdLength = 64;
+constexpr double kThousandths = 1000;
 constexpr std::pair<const char*, v1::AttemptEnding> kEndings[] = {{"finished", v1::ATTEMPT_ENDING_FINISHED},
                                                                   {"failed", v1::ATTEMPT_ENDING_FAILED},
                                                                   {"out_of_memory", v1::ATTEMPT_ENDING_OUT_OF_MEMORY},
@@ -59,6 +60,14 @@ v1::Reconstruction ToProto(const Reconstruction& stored) {
   reconstruction.set_weight(stored.weight);
   FillTime(stored.created_at, *reconstruction.mutable_create_time());
   if (stored.finished_at != absl::InfinitePast()) FillTime(stored.finished_at, *reconstruction.mutable_finish_time());
+  const bool is_worked_on =
+      stored.state == ReconstructionState::kRunning || stored.state == ReconstructionState::kJoining;
+  if (is_worked_on && stored.progress.expected_end != absl::InfinitePast()) {
+    FillTime(stored.progress.expected_end, *reconstruction.mutable_expected_finish_time());
+  }
+  if (stored.state == ReconstructionState::kJoining) {
+    reconstruction.set_stage(absl::StrCat("joining the mesh, ", stored.progress.joined_thousandths / 10, " %"));
+  }
   reconstruction.set_mesh_bytes(stored.mesh.bytes);
   reconstruction.set_mesh_sha256(stored.mesh.digest);
   v1::Progress& progress = *reconstruction.mutable_progress();
@@ -68,6 +77,7 @@ v1::Reconstruction ToProto(const Reconstruction& stored) {
   progress.set_cameras_in_flight(static_cast<int32_t>(stored.progress.cameras_in_flight));
   progress.set_patches_filtered(stored.progress.patches_filtered);
   progress.set_patches_accepted(stored.progress.patches_accepted);
+  progress.set_joined_share(static_cast<double>(stored.progress.joined_thousandths) / kThousandths);
   progress.set_vertices(stored.mesh.vertices);
   progress.set_faces(stored.mesh.faces);
   return reconstruction;

@@ -230,7 +230,7 @@ v1::Reconstruction ReconstructionService::Describe(const Reconstruction& stored)
                                              " of the method, this coordinator has version ", options_.method_version,
                                              ": it waits for a coordinator of the program that began it"));
   }
-  reconstruction.set_stage(workers_.StageOf(stored.id));
+  if (std::string stage = workers_.StageOf(stored.id); !stage.empty()) reconstruction.set_stage(std::move(stage));
   for (std::string& warning : workers_.WarningsFor(stored.id)) {
     reconstruction.add_warnings(std::move(warning));
   }

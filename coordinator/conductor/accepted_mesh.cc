@@ -20,7 +20,7 @@ absl::StatusOr<PatchLattice> LoadAcceptedSurface(BlobStore& blobs, const Accepte
 absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(const std::vector<AcceptedSurface>& surfaces, BlobStore& blobs,
                                                    const JoinOptions& options, const Eigen::Vector3d& offset,
                                                    const std::string& path, ThreadPool& pool,
-                                                   const std::function<void()>& part_done) {
+                                                   const JoinListener& listener) {
   SurfaceCache cache(
       [&](const std::string& digest) -> absl::StatusOr<SparseSurface> {
         MW_ASSIGN_OR_RETURN(const std::string bytes, blobs.Get(digest));
@@ -28,7 +28,7 @@ absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(const std::vector<AcceptedSur
       },
       kCacheBytes);
   const auto load = [&](int64_t i) { return cache.Get(surfaces[static_cast<size_t>(i)].digest); };
-  return WriteJoinedMesh(static_cast<int64_t>(surfaces.size()), load, options, offset, path, pool, part_done);
+  return WriteJoinedMesh(static_cast<int64_t>(surfaces.size()), load, options, offset, path, pool, listener);
 }
 
 }  // namespace meshwright

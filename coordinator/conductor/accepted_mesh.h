@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,12 +16,11 @@ namespace meshwright {
 absl::StatusOr<PatchLattice> LoadAcceptedSurface(BlobStore& blobs, const AcceptedSurface& surface);
 
 // The last step of a reconstruction: the mesh of its accepted surfaces, in the order of their commits, with
-// the scene's offset. `part_done`
-// is called twice per surface, one call at a time, on any thread.
+// the scene's offset.
 absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(
     const std::vector<AcceptedSurface>& surfaces, BlobStore& blobs, const JoinOptions& options,
     const Eigen::Vector3d& offset, const std::string& path, ThreadPool& pool,
-    const std::function<void()>& part_done = [] {});
+    const JoinListener& listener = [](double) {});
 
 }  // namespace meshwright
 // SPDX-License-Identifier: Apache-2.0

@@ -19,6 +19,11 @@ namespace {
 // Commits that are decided quickly share one wait for the disk; none waits much longer than this for another.
 constexpr absl::Duration kWriteEvery = absl::Milliseconds(50);
 
+// What judging again takes for each comparison, and the mesh for each accepted patch, by what acceptance takes for each
+// comparison: roughly, for JoiningProgress measures them once they run.
+constexpr double kJudgingByAcceptance = 1;
+constexpr double kJoiningByAcceptance = 30;
+
 std::string Name(SequenceNumber sequence) { return absl::StrCat("camera job ", sequence); }
 
 absl::Status CheckWeakTargets(const Assignment& assignment, const std::vector<CameraIndex>& weak_targets) {
@@ -93,7 +98,8 @@ Conductor::Conductor(std::string reconstruction_id, const std::vector<Camera>& c
       epoch_(epoch),
       job_bytes_(std::move(job_bytes)),
       schedule_(std::move(pairs.matrix), overlaps_,
-                ScheduleOptions{.window = options.window, .max_overlap_in_flight = options.acceptance.k_a}) {}
+                ScheduleOptions{.window = options.window, .max_overlap_in_flight = options.acceptance.k_a}),
+      to_grow_(cameras_, probes_, overlaps_, options.acceptance.k_a, *pool) {}
 
 absl::StatusOr<std::unique_ptr<Conductor>> Conductor::Open(const std::string& reconstruction_id,
                                                            const std::vector<Camera>& cameras,
@@ -111,6 +117,9 @@ absl::StatusOr<std::unique_ptr<Conductor>> Conductor::Open(const std::string& re
   MW_ASSIGN_OR_RETURN(const std::vector<CameraJob> jobs, store->ListCameraJobs(reconstruction_id));
   MW_ASSIGN_OR_RETURN(const std::vector<Commit> commits, store->ListCommits(reconstruction_id));
   const MutexLock lock(conductor->mutex_);
+  for (CameraIndex camera = 0; camera < conductor->schedule_.matrix().cameras(); ++camera) {
+    if (!conductor->schedule_.IsToCome(camera)) conductor->to_grow_.Commit(camera, /*is_processed=*/false);
+  }
   MW_RETURN_IF_ERROR(conductor->Replay(jobs, commits));
   return conductor;
 }
@@ -333,9 +342,13 @@ absl::StatusOr<Commit> Conductor::Accept(SequenceNumber sequence, CameraIndex ca
     if (absl::IsInvalidArgument(surface.status())) surface = absl::DataLossError(surface.status().message());
     return surface;
   };
+  const Stopwatch stopwatch;
   MW_ASSIGN_OR_RETURN(
       const AcceptanceResult result,
       AcceptSurface(filtered->ToLattice(), static_cast<int>(supporters.size()), load, options_.acceptance, *pool_));
+  acceptance_times_.seconds += stopwatch.Seconds();
+  acceptance_times_.comparisons +=
+      static_cast<double>(result.patches_filtered) * static_cast<double>(supporters.size());
   Commit commit = {.sequence = sequence,
                    .camera = camera,
                    .filtered_patches = result.patches_filtered,
@@ -347,13 +360,16 @@ absl::StatusOr<Commit> Conductor::Accept(SequenceNumber sequence, CameraIndex ca
 }
 
 void Conductor::Remember(const Commit& commit, const JobResult& result) {
+  const double expected_rays = RaysOf(commit.camera) * to_grow_.ShareNow(commit.camera);
+  to_grow_.Commit(commit.camera, !result.skipped);
   committed_[commit.camera] = {.sequence = commit.sequence,
                                .filtered_digest = commit.filtered_patches > 0 ? result.filtered_digest : std::string(),
                                .filtered_patches = commit.filtered_patches,
                                .accepted = {.sequence = commit.sequence,
                                             .camera = commit.camera,
                                             .digest = commit.accepted_digest,
-                                            .patches = commit.accepted_patches}};
+                                            .patches = commit.accepted_patches},
+                               .expected_rays = expected_rays};
   if (result.skipped) ++progress_.cameras_skipped;
   progress_.patches_filtered += commit.filtered_patches;
   progress_.patches_accepted += commit.accepted_patches;
@@ -393,6 +409,44 @@ Progress Conductor::CurrentProgress() const {
   progress.cameras_in_flight = static_cast<int64_t>(schedule_.in_flight().size());
   progress.cameras_total = progress.cameras_committed + progress.cameras_in_flight + schedule_.waiting_cameras();
   return progress;
+}
+
+double Conductor::RaysOf(CameraIndex camera) const {
+  const Camera& pinhole = scene_cameras_[static_cast<size_t>(camera)];
+  return static_cast<double>(Lattice::For(pinhole, options_.lattice_step).nodes());
+}
+
+double Conductor::ExpectedRays(CameraIndex camera) const {
+  const MutexLock lock(mutex_);
+  const auto found = committed_.find(camera);
+  return found == committed_.end() ? 0 : found->second.expected_rays;
+}
+
+void Conductor::SetExpectedEnd(absl::Time expected_end) {
+  const MutexLock lock(mutex_);
+  progress_.expected_end = expected_end;
+}
+
+ForecastInput Conductor::ForecastNow() const {
+  const MutexLock lock(mutex_);
+  ForecastInput input;
+  for (CameraIndex camera = 0; camera < schedule_.matrix().cameras(); ++camera) {
+    if (schedule_.IsToCome(camera)) input.left.Add(RaysOf(camera) * to_grow_.ExpectedShare(camera));
+  }
+  double done_rays = 0;
+  double comparisons = 0;  // that judging again takes, of the cameras that are committed
+  for (const auto& [camera, committed] : committed_) {
+    done_rays += committed.expected_rays;
+    const size_t supporters = std::min(overlaps_.Of(camera).size(), static_cast<size_t>(options_.max_surfaces));
+    comparisons += static_cast<double>(committed.filtered_patches) * static_cast<double>(supporters);
+  }
+  if (!(acceptance_times_.comparisons > 0) || !(done_rays > 0)) return input;
+  const double seconds = acceptance_times_.seconds / acceptance_times_.comparisons;
+  const double all_by_done = (done_rays + input.left.expected_rays) / done_rays;
+  input.judging_seconds = kJudgingByAcceptance * seconds * comparisons * all_by_done;
+  input.joining_seconds =
+      kJoiningByAcceptance * seconds * static_cast<double>(progress_.patches_accepted) * all_by_done;
+  return input;
 }
 
 bool Conductor::finished() const {

@@ -20,6 +20,8 @@
 #include "common/scene/scene.h"
 #include "common/surface/sparse_surface.h"
 #include "coordinator/acceptance/acceptance.h"
+#include "coordinator/forecast/surface_to_grow.h"
+#include "coordinator/forecast/time_left.h"
 #include "coordinator/incidence/feasible_pairs.h"
 #include "coordinator/incidence/overlap_graph.h"
 #include "coordinator/options/conductor_options.h"
@@ -41,6 +43,13 @@ struct CommittedSurface {
   AcceptedSurface accepted;           // M_r; its digest is "" when nothing was accepted
   std::string filtered_digest;        // F_r
   std::vector<Supporter> supporters;  // of the cameras that overlap it, ascending
+};
+
+// What is still to come, as far as it can be said now.
+struct ForecastInput {
+  CameraWork left;             // cameras that are not committed
+  double judging_seconds = 0;  // of judging all surfaces again once they are, and of the mesh; measured on what was
+  double joining_seconds = 0;  // accepted so far, 0 before
 };
 
 // Conducts one reconstruction: which camera is processed when (schedule), what it is given (targets, accepted
@@ -88,6 +97,12 @@ class Conductor {
   // Every committed camera that found something, in the order of commits, with supporters from before and after it.
   std::vector<CommittedSurface> CommittedSurfaces() const;
 
+  ForecastInput ForecastNow() const;
+  // Of a committed camera: rays that it was expected to grow.
+  double ExpectedRays(CameraIndex camera) const;
+  // Is told with the progress in the store from the next commit on.
+  void SetExpectedEnd(absl::Time expected_end);
+
   const FeasiblePairCounts& pair_counts() const { return pair_counts_; }
   FeasibilitySource feasibility_source() const { return feasibility_source_; }
 
@@ -97,6 +112,12 @@ class Conductor {
     std::string filtered_digest;  // "" when there is no patch in it
     int64_t filtered_patches = 0;
     AcceptedSurface accepted;  // its digest is "" when nothing was accepted
+    double expected_rays = 0;  // that it was to grow
+  };
+  // How long acceptance took so far, to tell how long it will take to judge all again and to join.
+  struct AcceptanceTimes {
+    double seconds = 0;
+    double comparisons = 0;  // patches times surfaces that they were held against
   };
 
   Conductor(std::string reconstruction_id, const std::vector<Camera>& cameras, FeasiblePairs pairs,
@@ -120,6 +141,7 @@ class Conductor {
   absl::StatusOr<Commit> Accept(SequenceNumber sequence, CameraIndex camera, const std::string& filtered_digest)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   SequenceNumber LastChoice() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  double RaysOf(CameraIndex camera) const;
   Progress CurrentProgress() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Remember(const Commit& commit, const JobResult& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   JobOutcome OutcomeOf(const Assignment& assignment, const JobResult& result) const
@@ -149,6 +171,8 @@ class Conductor {
   std::vector<CameraAssignment> unwritten_assignments_ ABSL_GUARDED_BY(mutex_);
   std::string damaged_blob_ ABSL_GUARDED_BY(mutex_);
   Progress progress_ ABSL_GUARDED_BY(mutex_);
+  SurfaceToGrow to_grow_ ABSL_GUARDED_BY(mutex_);
+  AcceptanceTimes acceptance_times_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace meshwright

@@ -23,7 +23,8 @@ OuterLoop::OuterLoop(const OuterLoopEnvironment& environment, std::string recons
     : environment_(environment),
       reconstruction_(std::move(reconstruction)),
       epoch_(epoch),
-      conductor_(std::move(conductor)) {}
+      conductor_(std::move(conductor)),
+      forecast_(reconstruction_, *conductor_, *environment.store, *environment.clock) {}
 
 absl::StatusOr<std::unique_ptr<OuterLoop>> OuterLoop::Open(const OuterLoopEnvironment& environment,
                                                            const std::string& reconstruction, int64_t epoch,
@@ -60,7 +61,19 @@ absl::StatusOr<OuterLoop::Progress> OuterLoop::Step() {
     if (!repaired) return Progress{.has_new_jobs = has_new_jobs_};
   }
   MW_ASSIGN_OR_RETURN(const bool nothing_damaged, RepairReported());
-  return Progress{.has_new_jobs = has_new_jobs_, .finished = nothing_damaged && conductor_->finished()};
+  MW_RETURN_IF_ERROR(Forecast());
+  return Progress{.has_new_jobs = has_new_jobs_,
+                  .finished = nothing_damaged && conductor_->finished(),
+                  .expected_end = conductor_->progress().expected_end};
+}
+
+// Told at once: the next commit may be long in coming.
+absl::Status OuterLoop::Forecast() {
+  MW_ASSIGN_OR_RETURN(const absl::Time expected_end, forecast_.ExpectedEnd());
+  if (expected_end == conductor_->progress().expected_end) return absl::OkStatus();
+  conductor_->SetExpectedEnd(expected_end);
+  return environment_.store->Advance(reconstruction_, {}, {}, conductor_->progress(), environment_.clock->Now(),
+                                     epoch_);
 }
 
 absl::StatusOr<bool> OuterLoop::Repair(const std::string& digest) {

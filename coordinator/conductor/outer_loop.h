@@ -15,6 +15,7 @@
 #include "common/blob/blob_store.h"
 #include "common/scene/scene.h"
 #include "coordinator/conductor/conductor.h"
+#include "coordinator/conductor/end_forecast.h"
 #include "coordinator/conductor/reconstruction_config.h"
 #include "coordinator/store/job_store.h"
 
@@ -49,8 +50,9 @@ class OuterLoop {
   void SetRepairOther(RepairOther repair) { repair_other_ = std::move(repair); }
 
   struct Progress {
-    bool has_new_jobs = false;  // in the store
-    bool finished = false;      // all cameras are committed, and no blob is reported as damaged
+    bool has_new_jobs = false;                       // in the store
+    bool finished = false;                           // all cameras are committed, and no blob is reported as damaged
+    absl::Time expected_end = absl::InfinitePast();  // of all of it, mesh included; or nothing can be said
   };
   // Goes as far as it can at the moment. To be called again when there may be something new in the store. Aborted:
   // somebody else conducts it. DataLoss: a blob is damaged or lost and cannot be made again.
@@ -66,6 +68,7 @@ class OuterLoop {
             std::unique_ptr<Conductor> conductor);
 
   absl::StatusOr<bool> RepairLocked(const std::string& digest) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status Forecast() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<bool> RepairReported() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<bool> RunAgain(SequenceNumber sequence, const std::string& digest)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -76,6 +79,7 @@ class OuterLoop {
   const std::unique_ptr<Conductor> conductor_;
   RepairOther repair_other_;
   Mutex mutex_;  // one step at a time
+  EndForecast forecast_ ABSL_GUARDED_BY(mutex_);
   bool has_new_jobs_ ABSL_GUARDED_BY(mutex_) = false;
 };
 

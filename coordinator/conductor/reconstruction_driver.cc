@@ -35,6 +35,10 @@ constexpr std::chrono::seconds kRetryDelay(10);
 constexpr std::chrono::milliseconds kPollInterval(250);
 constexpr int kMaxRepairsInARow = 100;
 
+// How often it is told how far the mesh is, which the store is written for.
+constexpr absl::Duration kTellEvery = absl::Seconds(1);
+constexpr double kThousandths = 1000;
+
 // COLMAP is a process of its own, whose memory its worker does not know; a worker of the smallest kind takes the job.
 constexpr int64_t kEstimationBytes = int64_t{512} << 20;
 
@@ -354,9 +358,35 @@ absl::StatusOr<JoinedMeshCounts> ReconstructionDriver::TryToWriteMesh(const Reco
                                                                       std::vector<AcceptedSurface>& surfaces) {
   LostBlobNamer blobs(*environment_.blobs);
   const auto put = [&](const std::string& bytes) { return referenced_blobs_.Put(bytes); };
-  MW_ASSIGN_OR_RETURN(surfaces, JudgeCommittedSurfaces(conductor.CommittedSurfaces(), config.conductor.acceptance,
-                                                       blobs, put, *environment_.pool));
-  return WriteAcceptedMesh(surfaces, blobs, config.join, offset_, path, *environment_.pool);
+  const ForecastInput forecast = conductor.ForecastNow();
+  JoiningProgress joining(forecast.judging_seconds, forecast.joining_seconds, *environment_.clock);
+  Stopwatch since_told(*environment_.clock);
+  const auto tell = [&] {
+    if (since_told.Elapsed() < kTellEvery) return;
+    since_told = Stopwatch(*environment_.clock);
+    TellJoining(joining, conductor);
+  };
+  const std::vector<CommittedSurface> committed = conductor.CommittedSurfaces();
+  MW_ASSIGN_OR_RETURN(
+      surfaces,
+      JudgeCommittedSurfaces(committed, config.conductor.acceptance, blobs, put, *environment_.pool, [&](int judged) {
+        joining.SetJudged(static_cast<double>(judged) / static_cast<double>(committed.size()));
+        tell();
+      }));
+  return WriteAcceptedMesh(surfaces, blobs, config.join, offset_, path, *environment_.pool, [&](double share) {
+    joining.SetJoined(share);
+    tell();
+  });
+}
+
+// Whether it arrives matters little; the end of the mesh is written by other means.
+void ReconstructionDriver::TellJoining(const JoiningProgress& joining, const Conductor& conductor) {
+  const absl::Time now = environment_.clock->Now();
+  Progress progress = conductor.progress();
+  progress.joined_thousandths = static_cast<int64_t>(kThousandths * joining.share());
+  if (joining.seconds_left() >= 0) progress.expected_end = now + absl::Seconds(joining.seconds_left());
+  environment_.store->Advance(id_, {}, {}, progress, now, epoch_).IgnoreError();
+  changed_(false);
 }
 
 absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionConfig& config, OuterLoop& loop) {

@@ -18,6 +18,7 @@
 #include "common/blob/blob_store.h"
 #include "common/scene/scene.h"
 #include "coordinator/conductor/conductor_lease.h"
+#include "coordinator/conductor/joining_progress.h"
 #include "coordinator/conductor/outer_loop.h"
 #include "coordinator/conductor/reconstruction_config.h"
 #include "coordinator/conductor/referenced_blobs.h"
@@ -96,6 +97,7 @@ class ReconstructionDriver {
   // `surfaces` gets what the mesh is made of.
   absl::StatusOr<JoinedMeshCounts> TryToWriteMesh(const ReconstructionConfig& config, const Conductor& conductor,
                                                   const std::string& path, std::vector<AcceptedSurface>& surfaces);
+  void TellJoining(const JoiningProgress& joining, const Conductor& conductor);
   absl::StatusOr<StoredMesh> WriteMesh(const ReconstructionConfig& config, OuterLoop& loop);
   absl::Status Repair(OuterLoop& loop, const std::string& digest);
   absl::StatusOr<bool> RepairScene(const std::string& digest);

@@ -36,7 +36,8 @@ constexpr double kAtPacking = 95;
 constexpr double kMinProgressStep = 0.1;
 
 constexpr char kCamerasNeeded[] =
-    "Photographs alone need a worker with COLMAP, and none is connected. Start one, or send the model of the cameras among "
+    "Photographs alone need a worker with COLMAP, and none is connected. Start one, or send the model of the cameras "
+    "among "
     "the images, e.g. COLMAP's cameras.txt, images.txt and points3D.txt (or .bin), Middlebury's _par.txt or Strecha's "
     ".camera files; photographs are matched by their names";
 

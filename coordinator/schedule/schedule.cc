@@ -46,6 +46,11 @@ std::vector<Assignment> Schedule::TakeChoices() {
   return choices;
 }
 
+bool Schedule::IsToCome(CameraIndex camera) const {
+  const State state = state_[static_cast<size_t>(camera)];
+  return state == State::kInFlight || (state == State::kWaiting && matrix_.RowSum(camera) > 0);
+}
+
 absl::Status Schedule::Commit(const JobOutcome& commit) {
   if (in_flight_.empty() || commit.sequence != in_flight_.front().sequence) {
     return absl::InvalidArgumentError(absl::StrCat("commit ", commit.sequence, ": expected the next in order, ",

@@ -83,6 +83,8 @@ class Schedule {
   bool finished() const { return in_flight_.empty() && waiting_cameras_ == 0; }
   // Cameras with a row left that are not in flight: what is still to come, unless pruned.
   int waiting_cameras() const { return waiting_cameras_; }
+  // In flight, or waiting.
+  bool IsToCome(CameraIndex camera) const;
   // The matrix after commit commits(); rows of processed cameras are empty.
   const IncidenceMatrix& matrix() const { return matrix_; }
 

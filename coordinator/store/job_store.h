@@ -27,6 +27,8 @@ struct Progress {
   int64_t cameras_in_flight = 0;
   int64_t patches_filtered = 0;  // over committed cameras
   int64_t patches_accepted = 0;
+  int64_t joined_thousandths = 0;                  // of judging again and joining, once all cameras are committed
+  absl::Time expected_end = absl::InfinitePast();  // of all of it, mesh included, as far as can be said; or nothing can
 
   bool operator==(const Progress&) const = default;
 };

@@ -702,6 +702,8 @@ TEST_P(JobStoreConformance, CommitsAndChoicesAdvanceTogether) {
   const std::vector<CameraAssignment> choices = {{3, 5, 2, 0}};
   EXPECT_EQ(store().GetReconstruction("castle")->progress, progress);
   progress.cameras_committed = 2;
+  progress.joined_thousandths = 431;
+  progress.expected_end = kNow + absl::Minutes(3);
   EXPECT_TRUE(absl::IsAborted(store().Advance("castle", commits, choices, progress, kNow, 2)));
   EXPECT_TRUE(absl::IsFailedPrecondition(store().Advance("castle", {commits[1]}, choices, progress, kNow, 1)));
   EXPECT_TRUE(store().ListCommits("castle")->empty());

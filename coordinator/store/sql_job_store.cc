@@ -39,7 +39,9 @@ absl::StatusOr<Reconstruction> ReadReconstruction(const SqlRow& row) {
                              .cameras_skipped = row.Integer(16),
                              .cameras_in_flight = row.Integer(17),
                              .patches_filtered = row.Integer(18),
-                             .patches_accepted = row.Integer(19)};
+                             .patches_accepted = row.Integer(19),
+                             .joined_thousandths = row.Integer(22)};
+  if (!row.IsNull(23)) reconstruction.progress.expected_end = row.Time(23);
   reconstruction.owner = row.Text(20);
   reconstruction.method_version = row.Integer(21);
   return reconstruction;
@@ -80,6 +82,10 @@ SqlCall AssignCall(const std::string& id, const CameraAssignment& assignment, ab
            {"conductor_epoch", conductor_epoch}}};
 }
 
+SqlValue NullIfNever(absl::Time time) {
+  return time == absl::InfinitePast() ? SqlValue(std::nullopt) : SqlValue(absl::ToUnixMicros(time));
+}
+
 SqlCall ProgressCall(const std::string& id, const Progress& progress, int64_t conductor_epoch) {
   return {"set_progress",
           {{"id", id},
@@ -89,6 +95,8 @@ SqlCall ProgressCall(const std::string& id, const Progress& progress, int64_t co
            {"cameras_in_flight", progress.cameras_in_flight},
            {"patches_filtered", progress.patches_filtered},
            {"patches_accepted", progress.patches_accepted},
+           {"joined_thousandths", progress.joined_thousandths},
+           {"expected_end", NullIfNever(progress.expected_end)},
            {"conductor_epoch", conductor_epoch}}};
 }
 

@@ -31,6 +31,7 @@
 #include "coordinator/conductor/accepted_mesh.h"
 #include "coordinator/conductor/conductor_lease.h"
 #include "coordinator/conductor/final_surfaces.h"
+#include "coordinator/conductor/joining_progress.h"
 #include "coordinator/conductor/outer_loop.h"
 #include "worker/job_input/view_cache.h"
 
@@ -43,6 +44,8 @@ using Json = nlohmann::ordered_json;
 // Names this process as the conductor of its reconstruction.
 constexpr char kConductor[] = "local";
 constexpr absl::Duration kConductorLease = absl::Minutes(1);
+// The mesh's parts of which progress is told.
+constexpr int kThousandths = 1000;
 // Surfaces that are found damaged or lost when the mesh is written are made again so often.
 constexpr int kMaxRepairs = 100;
 
@@ -253,20 +256,35 @@ class LocalReconstruction {
     progress_.share_covered = static_cast<double>(totals_.rays_covered_before) / rays;
     progress_.share_grown = static_cast<double>(totals_.rays_grown) / rays;
     progress_.share_accepted = static_cast<double>(conducted.patches_accepted) / rays;
+    const bool is_known = conducted.expected_end != absl::InfinitePast();
+    progress_.seconds_left =
+        is_known ? std::max(0.0, absl::ToDoubleSeconds(conducted.expected_end - clock_.Now())) : -1;
     Tell(LocalStage::kCameras, static_cast<int>(conducted.cameras_committed),
          static_cast<int>(conducted.cameras_total));
   }
 
   absl::StatusOr<Json> WriteResults() {
     const std::vector<CommittedSurface> committed = loop_->conductor().CommittedSurfaces();
-    Tell(LocalStage::kJudging, 0, static_cast<int>(committed.size()));
-    MW_ASSIGN_OR_RETURN(
-        const std::vector<AcceptedSurface> surfaces,
-        JudgeCommittedSurfaces(
-            committed, options_.conductor.acceptance, *blobs_,
-            [&](const std::string& bytes) { return blobs_->Put(bytes); }, pool_,
-            [&](int judged) { Tell(LocalStage::kJudging, judged, static_cast<int>(committed.size())); }));
-    Tell(LocalStage::kJoining, 0, static_cast<int>(surfaces.size()));
+    const ForecastInput forecast = loop_->conductor().ForecastNow();
+    JoiningProgress joining(forecast.judging_seconds, forecast.joining_seconds, clock_);
+    const auto tell = [&](LocalStage stage, int done, int total) {
+      progress_.seconds_left = joining.seconds_left();
+      Tell(stage, done, total);
+    };
+    tell(LocalStage::kJudging, 0, static_cast<int>(committed.size()));
+    MW_ASSIGN_OR_RETURN(const std::vector<AcceptedSurface> surfaces,
+                        JudgeCommittedSurfaces(
+                            committed, options_.conductor.acceptance, *blobs_,
+                            [&](const std::string& bytes) { return blobs_->Put(bytes); }, pool_,
+                            [&](int judged) {
+                              joining.SetJudged(static_cast<double>(judged) / static_cast<double>(committed.size()));
+                              tell(LocalStage::kJudging, judged, static_cast<int>(committed.size()));
+                            }));
+    const auto tell_joined = [&](double share) {
+      joining.SetJoined(share);
+      tell(LocalStage::kJoining, static_cast<int>(kThousandths * share), kThousandths);
+    };
+    tell_joined(0);
     MW_ASSIGN_OR_RETURN(Json cameras,
                         MakeCamerasReport(scene_, work_->store(), WorkFolder::kReconstructionId, &totals_));
     if (surfaces.empty()) return absl::FailedPreconditionError(DescribeNothing(totals_, options_));
@@ -279,18 +297,16 @@ class LocalReconstruction {
         settings_.accepted_listener(accepted);
       }
     }
-    const auto count = static_cast<int>(surfaces.size());
-    int loaded = 0;  // each at least twice
-    const auto loading = [&] { Tell(LocalStage::kJoining, std::min(loaded++ / 2, count), count); };
     const std::string ply_path = IsPly(*format_) ? settings_.output_path : work_->MeshPath();
-    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts,
-                        WriteAcceptedMesh(surfaces, *blobs_, options_.join, scene_.offset, ply_path, pool_, loading));
+    MW_ASSIGN_OR_RETURN(const JoinedMeshCounts counts, WriteAcceptedMesh(surfaces, *blobs_, options_.join,
+                                                                         scene_.offset, ply_path, pool_, tell_joined));
     if (counts.faces == 0) {
       std::error_code error;
       fs::remove(ply_path, error);
       return absl::FailedPreconditionError(DescribeNothing(totals_, options_));
     }
-    Tell(LocalStage::kJoining, count, count);
+    tell_joined(1);
+    progress_.seconds_left = -1;
     Json texture;
     if (!IsPly(*format_)) {
       MW_ASSIGN_OR_RETURN(texture, WriteInFormat(ply_path));

@@ -14,6 +14,7 @@ export interface Progress {
   patchesAccepted?: string;
   vertices?: string;
   faces?: string;
+  joinedShare?: number; // 0 to 1, while JOINING
 }
 
 export interface Reconstruction {
@@ -28,7 +29,8 @@ export interface Reconstruction {
   progress?: Progress;
   meshBytes?: string;
   meshSha256?: string;
-  stage?: string; // what is being done while PREPARING, in words
+  stage?: string; // what is being done while PREPARING or JOINING, in words
+  expectedFinishTime?: string; // while RUNNING or JOINING, as soon as something can be said
 }
 
 // Positions are the numbers in CameraTable.states.

@@ -19,7 +19,27 @@ export function StateBadge({ state }: { state: ReconstructionState }) {
   return <span class={`badge ${tone}`}>{words}</span>;
 }
 
-export function ProgressBar({ progress, label }: { progress: Progress | undefined; label: string }) {
+function JoiningBar({ share, label }: { share: number; label: string }) {
+  const percents = Math.floor(100 * share);
+  return (
+    <div
+      class="progress"
+      role="progressbar"
+      aria-label={label}
+      aria-valuemin={0}
+      aria-valuemax={100}
+      aria-valuenow={percents}
+      aria-valuetext={`${percents} % of the mesh joined`}
+    >
+      <span style={{ width: `${percents}%` }} />
+    </div>
+  );
+}
+
+// Cameras; once all are committed, the mesh.
+export function ProgressBar(props: { progress: Progress | undefined; label: string; state: ReconstructionState }) {
+  const { progress, label, state } = props;
+  if (state === 'JOINING') return <JoiningBar share={progress?.joinedShare ?? 0} label={label} />;
   const total = progress?.camerasTotal ?? 0;
   const committed = progress?.camerasCommitted ?? 0;
   const inFlight = progress?.camerasInFlight ?? 0;

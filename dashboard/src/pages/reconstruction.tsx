@@ -35,13 +35,13 @@ function Summary({ store, reconstruction }: { store: ReconstructionStore; recons
   const total = progress.camerasTotal ?? 0;
   const start = Date.parse(reconstruction.createTime ?? '') || now;
   const end = isOver(state) ? Date.parse(reconstruction.finishTime ?? '') || now : now;
-  const left = state === 'RUNNING' ? secondsLeft(store.samples.value, total, start, now) : null;
+  const left = secondsLeft(reconstruction, now);
   const filtered = Number(progress.patchesFiltered ?? 0);
   const first = state === 'RUNNING' ? store.firstHeld() : null;
   const name = first === null ? undefined : store.cameras.value?.names[first.camera];
   return (
     <section class="card summary" aria-label="Progress">
-      <ProgressBar progress={progress} label="Cameras committed" />
+      <ProgressBar progress={progress} label={state === 'JOINING' ? 'Mesh joined' : 'Cameras committed'} state={state} />
       <dl class="facts">
         <Fact name="Cameras" value={`${count(progress.camerasCommitted ?? 0)} of ${count(total)}`} />
         {!isOver(state) && (
@@ -63,7 +63,7 @@ function Summary({ store, reconstruction }: { store: ReconstructionStore; recons
           />
         )}
         <Fact name={isOver(state) ? 'Took' : 'Running for'} value={duration(Math.max(0, (end - start) / 1000))} />
-        {left !== null && <Fact name="Left" value={`about ${duration(left)}`} />}
+        {left !== null && <Fact name="Left" value={`about ${duration(left)}`} title="Until the mesh is there" />}
       </dl>
       {first !== null && (
         <p class="muted small">

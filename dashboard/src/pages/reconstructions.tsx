@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-import { useState } from 'preact/hooks';
 import { api } from '../api/client';
 import { isOver, stateOf, type Reconstruction } from '../api/types';
 import { useNow, usePolled } from '../components/hooks';
 import { Notice, PageTitle, ProgressBar, StateBadge } from '../components/pieces';
 import { SlowestStep } from '../components/slowest_step';
-import { count, dateTime, duration } from '../format';
+import { count, dateTime, duration, percent } from '../format';
 import { linkTo } from '../router';
-import { secondsLeft, withSample, type Sample } from '../state/eta';
+import { secondsLeft } from '../state/eta';
 
 const POLL_MS = 2000;
 
@@ -16,12 +15,12 @@ function newestFirst(a: Reconstruction, b: Reconstruction): number {
   return over || (b.createTime ?? '').localeCompare(a.createTime ?? '') || a.id.localeCompare(b.id);
 }
 
-function Row({ reconstruction, samples, now }: { reconstruction: Reconstruction; samples: Sample[]; now: number }) {
+function Row({ reconstruction, now }: { reconstruction: Reconstruction; now: number }) {
   const state = stateOf(reconstruction);
   const progress = reconstruction.progress;
   const start = Date.parse(reconstruction.createTime ?? '') || now;
   const total = progress?.camerasTotal ?? 0;
-  const left = state === 'RUNNING' ? secondsLeft(samples, total, start, now) : null;
+  const left = secondsLeft(reconstruction, now);
   const finish = Date.parse(reconstruction.finishTime ?? '');
   return (
     <li class="card list-row">
@@ -31,11 +30,12 @@ function Row({ reconstruction, samples, now }: { reconstruction: Reconstruction;
         <span class="muted small">{dateTime(reconstruction.createTime)}</span>
       </div>
       <div class="list-progress">
-        <ProgressBar progress={progress} label={`Progress of ${reconstruction.id}`} />
+        <ProgressBar progress={progress} label={`Progress of ${reconstruction.id}`} state={state} />
         <div class="muted small list-numbers">
           <span>
             {count(progress?.camerasCommitted ?? 0)} of {count(total)} cameras
             {(progress?.camerasSkipped ?? 0) > 0 && `, ${progress!.camerasSkipped} skipped`}
+            {state === 'JOINING' && `, mesh joined ${percent(progress?.joinedShare ?? 0)}`}
           </span>
           {left !== null && <span>about {duration(left)} left</span>}
           {isOver(state) && finish > start && <span>took {duration((finish - start) / 1000)}</span>}
@@ -51,13 +51,8 @@ function Row({ reconstruction, samples, now }: { reconstruction: Reconstruction;
 }
 
 export function ReconstructionsPage() {
-  const [samples] = useState(() => new Map<string, Sample[]>());
   const { value, error } = usePolled(async () => {
     const all = await api.listReconstructions();
-    for (const { id, progress } of all) {
-      const sample = { timeMs: Date.now(), committed: progress?.camerasCommitted ?? 0 };
-      samples.set(id, withSample(samples.get(id) ?? [], sample));
-    }
     return all.sort(newestFirst);
   }, POLL_MS);
   const now = useNow();
@@ -83,12 +78,7 @@ export function ReconstructionsPage() {
       )}
       <ul class="list">
         {value?.map((reconstruction) => (
-          <Row
-            key={reconstruction.id}
-            reconstruction={reconstruction}
-            samples={samples.get(reconstruction.id) ?? []}
-            now={now}
-          />
+          <Row key={reconstruction.id} reconstruction={reconstruction} now={now} />
         ))}
       </ul>
     </>

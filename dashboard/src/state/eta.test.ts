@@ -1,31 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 import { describe, expect, it } from 'vitest';
-import { secondsLeft, withSample, type Sample } from './eta';
+import type { Reconstruction, ReconstructionState } from '../api/types';
+import { secondsLeft } from './eta';
 
-const steady = (count: number, everyMs: number) => {
-  let samples: Sample[] = [];
-  for (let i = 0; i <= count; ++i) samples = withSample(samples, { timeMs: i * everyMs, committed: i });
-  return samples;
-};
+const END = '2026-11-29T10:00:00Z';
+const expected = (state: ReconstructionState, expectedFinishTime?: string): Reconstruction => ({
+  id: 'a',
+  state: `RECONSTRUCTION_STATE_${state}`,
+  expectedFinishTime,
+});
+const at = (time: string) => Date.parse(time);
 
 describe('secondsLeft', () => {
-  it('is the rest divided by the rate', () => {
-    expect(secondsLeft(steady(10, 2000), 100, 0, 20_000)).toBeCloseTo(180);
+  it('is what the coordinator says, and runs down', () => {
+    expect(secondsLeft(expected('RUNNING', END), at('2026-11-29T09:57:00Z'))).toBe(180);
+    expect(secondsLeft(expected('JOINING', END), at('2026-11-29T09:59:50Z'))).toBe(10);
   });
-  it('runs down between two commits', () => {
-    const samples = steady(10, 2000);
-    expect(secondsLeft(samples, 100, 0, 21_000)!).toBeCloseTo(secondsLeft(samples, 100, 0, 20_000)! - 1);
+  it('is never nothing before it is done', () => {
+    expect(secondsLeft(expected('RUNNING', END), at('2026-11-29T10:03:00Z'))).toBe(1);
   });
-  it('says nothing before the first commit, and zero after the last', () => {
-    expect(secondsLeft([{ timeMs: 0, committed: 0 }], 10, 0, 5000)).toBeNull();
-    expect(secondsLeft(steady(10, 1000), 10, 0, 10_000)).toBe(0);
-  });
-  it('takes the time since the start when the page has just been opened', () => {
-    expect(secondsLeft([{ timeMs: 60_000, committed: 30 }], 60, 0, 60_000)).toBeCloseTo(60);
-  });
-  it('forgets what is longer ago than ten minutes', () => {
-    let samples = steady(5, 1000);
-    for (let i = 0; i < 20; ++i) samples = withSample(samples, { timeMs: 3_600_000 + 60_000 * i, committed: 6 + i });
-    expect(secondsLeft(samples, 35, 0, samples.at(-1)!.timeMs)).toBeCloseTo(600);
+  it('says nothing while nothing is known, and when nothing is left', () => {
+    expect(secondsLeft(expected('RUNNING'), at(END))).toBeNull();
+    for (const state of ['CREATED', 'PREPARING', 'DONE', 'FAILED', 'CANCELLED'] as const) {
+      expect(secondsLeft(expected(state, END), at('2026-11-29T09:00:00Z'))).toBeNull();
+    }
   });
 });

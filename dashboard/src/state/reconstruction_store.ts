@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // Everything the page knows about one reconstruction. Events say what is new; what is large is asked for again when an
 // event has made it old and somebody looks at it.
-import { batch, signal } from '@preact/signals';
+import { signal } from '@preact/signals';
 import type { CameraTable } from '../api/camera_table';
 import { api, reconstructionUrl, tokenWanted } from '../api/client';
 import { DataService } from '../api/data_service';
 import { EventStream, type ConnectionState } from '../api/event_stream';
 import {
-  isOver,
   runs,
-  stateOf,
   type Attempt,
   type Camera,
   type LogEntry,
   type Part,
   type Reconstruction,
 } from '../api/types';
-import { withSample, type Sample } from './eta';
 import { firstInOrder } from './order';
 import { Refresher } from './refresher';
 
@@ -31,7 +28,6 @@ export class ReconstructionStore {
   readonly attempts = signal<readonly Attempt[]>([]);
   readonly incidence = signal<Int32Array | null>(null);
   readonly log = signal<readonly LogEntry[]>([]);
-  readonly samples = signal<readonly Sample[]>([]);
   readonly data = new DataService();
 
   private readonly stream: EventStream;
@@ -120,13 +116,7 @@ export class ReconstructionStore {
   }
 
   private takeReconstruction(reconstruction: Reconstruction) {
-    batch(() => {
-      this.reconstruction.value = reconstruction;
-      if (!isOver(stateOf(reconstruction))) {
-        const committed = reconstruction.progress?.camerasCommitted ?? 0;
-        this.samples.value = withSample(this.samples.value, { timeMs: Date.now(), committed });
-      }
-    });
+    this.reconstruction.value = reconstruction;
     this.refreshAll();
   }
 

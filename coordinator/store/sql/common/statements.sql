@@ -17,19 +17,22 @@ VALUES (:id, :options_json, :scene_digest, :state, :now, :reason, :weight_thousa
 -- name: get_reconstruction
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
-       cameras_in_flight, patches_filtered, patches_accepted, owner, method_version
+       cameras_in_flight, patches_filtered, patches_accepted, owner, method_version, joined_thousandths,
+       expected_end_at
 FROM reconstructions WHERE id = :id;
 
 -- name: list_reconstructions
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
-       cameras_in_flight, patches_filtered, patches_accepted, owner, method_version
+       cameras_in_flight, patches_filtered, patches_accepted, owner, method_version, joined_thousandths,
+       expected_end_at
 FROM reconstructions WHERE id > :after AND state <> 'deleting' ORDER BY id LIMIT :limit;
 
 -- name: list_reconstructions_of
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
-       cameras_in_flight, patches_filtered, patches_accepted, owner, method_version
+       cameras_in_flight, patches_filtered, patches_accepted, owner, method_version, joined_thousandths,
+       expected_end_at
 FROM reconstructions WHERE owner = :owner AND id > :after AND state <> 'deleting' ORDER BY id LIMIT :limit;
 
 -- name: usage_of
@@ -68,7 +71,8 @@ WHERE id = :id AND state NOT IN ('done', 'cancelled', 'failed', 'deleting')
 -- name: set_progress
 UPDATE reconstructions
 SET cameras_total = :cameras_total, cameras_committed = :cameras_committed, cameras_set_aside = :cameras_set_aside,
-    cameras_in_flight = :cameras_in_flight, patches_filtered = :patches_filtered, patches_accepted = :patches_accepted
+    cameras_in_flight = :cameras_in_flight, patches_filtered = :patches_filtered, patches_accepted = :patches_accepted,
+    joined_thousandths = :joined_thousandths, expected_end_at = :expected_end
 WHERE id = :id
   AND EXISTS (SELECT 1 FROM conductor_leases
               WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */);
