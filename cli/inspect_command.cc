@@ -5,6 +5,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "pipeline/inspection/inspection.h"
+#include "pipeline/local/time_estimate.h"
 #include "pipeline/options/option_table.h"
 
 #include "cli/commands.h"
@@ -17,6 +18,7 @@ namespace {
 
 constexpr char kExamples[] = R"(Examples:
   meshwright inspect scene
+  meshwright inspect scene --preset fine             # how long will it take?
   meshwright inspect scene --max-image-size 1536 --threads 8 --json
 Takes the options of reconstruct that matter before any work is done.)";
 
@@ -24,6 +26,7 @@ struct Arguments {
   SceneArguments scene;
   ReconstructionOptions options;
   int threads = AvailableCores();
+  bool no_trial = false;
   OutputSettings output;
 };
 
@@ -36,10 +39,18 @@ int RunCommand(const Arguments& arguments) {
   ThreadPool pool(arguments.threads);
   const absl::StatusOr<Inspection> inspection = Inspect(*scene, arguments.options, pool);
   if (!inspection.ok()) return Fail(inspection.status());
+  nlohmann::ordered_json json = ToJson(*inspection);
+  std::string text = ToText(*inspection);
+  if (!arguments.no_trial) {
+    const absl::StatusOr<TimeEstimate> estimate = EstimateTime(*scene, arguments.options, arguments.threads);
+    if (!estimate.ok()) return Fail(estimate.status());
+    json["expected"]["time"] = ToJson(*estimate);
+    absl::StrAppend(&text, "time       ", ToText(*estimate), "\n");
+  }
   if (arguments.output.json) {
-    PrintJson(ToJson(*inspection));
+    PrintJson(json);
   } else {
-    std::fputs(ToText(*inspection).c_str(), stdout);
+    std::fputs(text.c_str(), stdout);
   }
   return kExitDone;
 }
@@ -52,6 +63,8 @@ void AddInspectCommand(CLI::App& program, Run& run) {
   command.footer(kExamples);
   command.add_option("SCENE", arguments->scene.path, "folder with cameras and photographs")->required();
   AddSceneOptions(command, arguments->scene);
+  command.add_flag("--no-trial", arguments->no_trial,
+                   "do not say how long it will take, for which one or two cameras are tried");
   AddThreadsOption(command, arguments->threads);
   AddOutputOptions(command, arguments->output);
   AddReconstructionFlags(command, arguments->options);

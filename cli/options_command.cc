@@ -6,6 +6,7 @@
 #include <absl/strings/str_replace.h>
 
 #include "pipeline/options/option_table.h"
+#include "pipeline/options/presets.h"
 
 #include "cli/commands.h"
 #include "common/json/json_text.h"
@@ -42,7 +43,15 @@ std::string AsMarkdown() {
       "1`), the\n"
       "REST and gRPC interfaces as members of `options_json` (`{\"lattice-step\": 1}`). Both ends of a range are "
       "allowed.\n\n"
-      "This page is what `meshwright options --markdown` prints.\n";
+      "This page is what `meshwright options --markdown` prints.\n\n"
+      "## Presets\n"
+      "`--preset NAME`, `{\"preset\": \"NAME\"}` in `options_json`: values that go together. Options that are given by "
+      "themselves win.\n"
+      "`meshwright inspect SCENE --preset NAME` says how long it will take.\n\n"
+      "| preset | for | options |\n|---|---|---|\n";
+  for (const Preset& preset : Presets()) {
+    absl::StrAppend(&page, "| `", preset.name, "` | ", preset.help, " | ", DescribeValues(preset), " |\n");
+  }
   std::string section;
   for (const Option& option : OptionTable()) {
     if (option.section != section) {
@@ -57,12 +66,15 @@ std::string AsMarkdown() {
 }
 
 std::string AsText() {
-  std::string text;
+  std::string text = "Presets\n";
+  for (const Preset& preset : Presets()) {
+    absl::StrAppend(&text, "  --", kPreset, " ", preset.name, ": ", preset.help, " (", DescribeValues(preset), ")\n");
+  }
   std::string section;
   for (const Option& option : OptionTable()) {
     if (option.section != section) {
       section = option.section;
-      absl::StrAppend(&text, text.empty() ? "" : "\n", section, "\n");
+      absl::StrAppend(&text, "\n", section, "\n");
     }
     absl::StrAppend(&text, "  --", option.name, " (", FormatValue(option.Default()), "; ", DescribeRange(option),
                     "): ", option.help, "; ", option.trade_off, "\n");

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "pipeline/local/local_reconstruction.h"
+#include "pipeline/local/time_estimate.h"
 #include "pipeline/options/option_table.h"
 
 #include "cli/camera_stage.h"
@@ -32,6 +33,7 @@ Stopped or killed, the same command goes on from the last camera and ends with t
 struct Arguments {
   SceneArguments scene;
   ReconstructionOptions options;
+  bool options_chosen_by_preset = false;
   LocalSettings settings;
   TextureOptions texture;
   bool no_texture = false;
@@ -120,6 +122,11 @@ int Reconstruct(Arguments& arguments) {
   std::signal(SIGINT, OnStopSignal);
   std::signal(SIGTERM, OnStopSignal);
   const RealClock clock;
+  if (arguments.options_chosen_by_preset && !arguments.output.quiet) {
+    const absl::StatusOr<TimeEstimate> estimate = EstimateTime(*scene, arguments.options, settings.threads);
+    if (!estimate.ok()) return Fail(estimate.status());
+    std::fprintf(stderr, "%s\n", ToText(*estimate).c_str());
+  }
   ProgressDisplay display(ProgressDisplay::StyleFor(stderr, arguments.output.quiet), stderr, clock);
   CameraJobFunction job = [&](const CameraJobInput& input, ThreadPool& pool) {
     return RunCameraJob(input, arguments.options.job, pool);
@@ -187,7 +194,10 @@ void AddReconstructCommand(CLI::App& program, Run& run) {
       ->check(CLI::Range(int64_t{64}, int64_t{1} << 30));
   AddOutputOptions(command, arguments->output);
   AddReconstructionFlags(command, arguments->options);
-  command.callback([arguments, &run] { run = [arguments] { return Reconstruct(*arguments); }; });
+  command.callback([arguments, &command, &run] {
+    arguments->options_chosen_by_preset = command.count("--preset") > 0;
+    run = [arguments] { return Reconstruct(*arguments); };
+  });
 }
 
 }  // namespace meshwright

@@ -6,8 +6,8 @@
 
 namespace meshwright {
 
-// --lattice-step and all others of the option table, each checked as it is read. What they ask of each other is left to
-// CheckOptions, when all are known.
+// --preset, and --lattice-step and all others of the option table, each checked as it is read. What they ask of each
+// other is left to CheckOptions, when all are known.
 void AddReconstructionFlags(CLI::App& command, ReconstructionOptions& options);
 
 }  // namespace meshwright

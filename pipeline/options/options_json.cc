@@ -6,6 +6,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "pipeline/options/option_table.h"
+#include "pipeline/options/presets.h"
 
 #include "common/base/method_version.h"
 #include "common/base/status_macros.h"
@@ -65,8 +66,12 @@ absl::StatusOr<ReconstructionOptions> ParseOptions(const std::string& options_js
   if (!json.ok()) return Wrong(absl::StrCat("the text ", std::string(json.status().message())));
   if (!json->is_object()) return Wrong("a JSON object expected");
   ReconstructionOptions options;
+  if (const auto preset = json->find(kPreset); preset != json->end()) {
+    const std::string name = preset->is_string() ? preset->get<std::string>() : JsonText(*preset);
+    if (const absl::Status set = ApplyPreset(name, "", options); !set.ok()) return Wrong(std::string(set.message()));
+  }
   for (const auto& [name, value] : json->items()) {
-    if (name == kMethod || name == kProgram) continue;
+    if (name == kMethod || name == kProgram || name == kPreset) continue;
     if (const absl::Status set = SetOption(name, value, options); !set.ok()) return Wrong(std::string(set.message()));
   }
   const auto program = json->find(kProgram);
@@ -126,6 +131,13 @@ std::string DescribeOptionsForRest() {
   }
   nlohmann::ordered_json response;
   response["options"] = std::move(list);
+  nlohmann::ordered_json presets = nlohmann::ordered_json::array();
+  for (const Preset& preset : Presets()) {
+    nlohmann::ordered_json values = nlohmann::ordered_json::object();
+    for (const auto& [name, value] : preset.values) values[name] = ToJson(value);
+    presets.push_back({{"name", preset.name}, {"documentation", preset.help}, {"values", std::move(values)}});
+  }
+  response["presets"] = std::move(presets);
   return JsonText(response);
 }
 

@@ -11,7 +11,8 @@
 
 namespace meshwright {
 
-// Options as users of REST and gRPC write them: a JSON object, {"window": 4}, any of them left out. "" stands for {}.
+// Options as users of REST and gRPC write them: a JSON object, {"window": 4}, any of them left out; {"preset": "draft"}
+// chooses what those left out are. "" stands for {}.
 // InvalidArgument begins with "options_json: ", then names the option, its value and the values allowed.
 absl::StatusOr<ReconstructionOptions> ParseOptions(const std::string& options_json);
 
@@ -25,7 +26,7 @@ std::vector<std::string> DescribeDifferences(const nlohmann::ordered_json& befor
 std::string DescribeMethods(int64_t before, int64_t now);
 
 // The answer of GET /v1/options: {"options": [...]}, each with name, group, type, unit, default, minimum, maximum,
-// documentation and tradeOff.
+// documentation and tradeOff, and {"presets": [...]}, each with name, documentation and values.
 std::string DescribeOptionsForRest();
 
 }  // namespace meshwright

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { signal } from '@preact/signals';
-import type { Format, LogEntry, Option, Problem, Reconstruction, SceneFile, Worker } from './types';
+import type { Format, LogEntry, Option, Preset, Problem, Reconstruction, SceneFile, Worker } from './types';
 
 // The API lies beside the page, below whatever path a proxy puts both.
 export function apiUrl(path: string): string {
@@ -110,5 +110,5 @@ export const api = {
   workers: async () => (await getJson<{ workers?: Worker[] }>('workers')).workers ?? [],
   drain: async (worker: string) => void (await call(`workers/${encodeURIComponent(worker)}:drain`, { method: 'POST' })),
   formats: async () => (await getJson<{ formats?: Format[] }>('formats')).formats ?? [],
-  options: async () => (await getJson<{ options?: Option[] }>('options')).options ?? [],
+  options: () => getJson<{ options?: Option[]; presets?: Preset[] }>('options'),
 };

@@ -119,6 +119,12 @@ export interface Option {
   tradeOff: string;
 }
 
+export interface Preset {
+  name: string;
+  documentation: string;
+  values: Record<string, number>;
+}
+
 export interface Format {
   name: string;
   ending: string;

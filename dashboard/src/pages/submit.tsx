@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { api, ApiError, csrfHeader, errorOf, reconstructionUrl } from '../api/client';
-import type { Option } from '../api/types';
-import { Notice, PageTitle } from '../components/pieces';
+import type { Option, Preset } from '../api/types';
+import { Notice, PageTitle, Segmented } from '../components/pieces';
 import { bytes, count, duration } from '../format';
 import { linkTo } from '../router';
 import { Digester } from '../upload/digest';
@@ -136,6 +136,26 @@ function Options(props: {
         );
       })}
     </>
+  );
+}
+
+// The options as they are where nothing is said.
+function withDefaults(options: Option[], preset: Preset | undefined): Option[] {
+  return options.map((option) => ({ ...option, default: preset?.values[option.name] ?? option.default }));
+}
+
+function PresetField(props: { presets: Preset[]; value: string; onChange: (name: string) => void }) {
+  const chosen = props.presets.find(({ name }) => name === props.value);
+  return (
+    <div class="preset">
+      <Segmented
+        label="Preset"
+        value={props.value}
+        options={props.presets.map(({ name }) => [name, name] as const)}
+        onChange={props.onChange}
+      />
+      <p class="muted small">{chosen?.documentation}</p>
+    </div>
   );
 }
 
@@ -307,6 +327,8 @@ export default function SubmitPage({ again, region }: SubmitPageProps) {
   const [id, setId] = useState('');
   const [weight, setWeight] = useState('1');
   const [options, setOptions] = useState<Option[]>([]);
+  const [presets, setPresets] = useState<Preset[]>([]);
+  const [preset, setPreset] = useState('normal');
   const [values, setValues] = useState<Record<string, string>>({});
   const [progress, setProgress] = useState<UploadProgress | null>(null);
   const [busy, setBusy] = useState(false);
@@ -314,7 +336,13 @@ export default function SubmitPage({ again, region }: SubmitPageProps) {
   const startMs = useRef(0);
   const uploader = useRef<Uploader | null>(null);
   useEffect(() => {
-    api.options().then(setOptions, (error: Error) => setFailure(`Options cannot be shown: ${error.message}`));
+    api.options().then(
+      (answer) => {
+        setOptions(answer.options ?? []);
+        setPresets(answer.presets ?? []);
+      },
+      (error: Error) => setFailure(`Options cannot be shown: ${error.message}`),
+    );
     if (again !== undefined) void takeOver(again);
     return () => uploader.current?.stop();
   }, []);
@@ -344,7 +372,8 @@ export default function SubmitPage({ again, region }: SubmitPageProps) {
 
   const send = async () => {
     const chosen = Object.entries(values).filter(([, value]) => value !== '');
-    const optionsJson = JSON.stringify(Object.fromEntries(chosen.map(([name, value]) => [name, Number(value)])));
+    const said = Object.fromEntries(chosen.map(([name, value]) => [name, Number(value)]));
+    const optionsJson = JSON.stringify({ ...presets.find(({ name }) => name === preset)?.values, ...said });
     if (again !== undefined) {
       await api.createAgain(again, { id, optionsJson, weight: Number(weight) });
     } else {
@@ -413,11 +442,12 @@ export default function SubmitPage({ again, region }: SubmitPageProps) {
         <section class="card options" aria-labelledby="options-title">
           <header>
             <h2 id="options-title">Options</h2>
-            <span class="note">those that stay empty have their defaults</span>
+            <span class="note">those that stay empty are as the preset has them</span>
           </header>
           <div class="body">
+            {presets.length > 0 && <PresetField presets={presets} value={preset} onChange={setPreset} />}
             <Options
-              options={options}
+              options={withDefaults(options, presets.find(({ name }) => name === preset))}
               values={values}
               onChange={(name, value) => setValues({ ...values, [name]: value })}
             />
