@@ -1,6 +1,5 @@
 #include "cli/loss_follower.h"
 
-#include <cstdio>
 #include <utility>
 #include <vector>
 
@@ -9,9 +8,7 @@
 #include "tools/loss_accounting/loss_accounting.h"
 
 #include "common/base/bad_input.h"
-#include "common/base/files.h"
 #include "common/base/status_macros.h"
-#include "common/json/json_text.h"
 #include "common/mesh/ply.h"
 #include "common/scene/view.h"
 
@@ -36,20 +33,23 @@ class AccountingFollower : public LossFollower {
 
   void RecordAccepted(const PatchLattice& accepted) override { losses_.RecordAccepted(accepted); }
 
-  absl::Status Account(const LocalSettings& settings, nlohmann::ordered_json& report) override {
-    MW_ASSIGN_OR_RETURN(TriangleMesh mesh, ReadPly(settings.output_path));
+  absl::Status Account(const std::string& ply_path, nlohmann::ordered_json& report) override {
+    MW_ASSIGN_OR_RETURN(TriangleMesh mesh, ReadPly(ply_path));
     ChangeOffset(offset_, mesh);
     const LossReport lost = losses_.Account(mesh, pool_);
     report["losses"] = ToJson(lost);
-    std::fputs(ToText(lost).c_str(), stderr);
-    return WriteFileAtomically(settings.report_path, JsonText(report, 2) + "\n");
+    words_ = ToText(lost);
+    return absl::OkStatus();
   }
+
+  const std::string& Words() const override { return words_; }
 
  private:
   const CameraJobOptions& options_;
   ThreadPool& pool_;
   const Eigen::Vector3d offset_;  // of all meshes and the cameras
   LossAccounting losses_;
+  std::string words_;
 };
 
 }  // namespace

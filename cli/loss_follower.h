@@ -7,7 +7,6 @@
 #include <absl/status/statusor.h>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/local/local_reconstruction.h"
 #include "pipeline/options/reconstruction_options.h"
 
 #include "common/base/thread_pool.h"
@@ -23,8 +22,10 @@ class LossFollower {
   virtual ~LossFollower() = default;
   virtual CameraJobResult RunJob(const CameraJobInput& input, ThreadPool& pool) = 0;
   virtual void RecordAccepted(const PatchLattice& accepted) = 0;
-  // Compares the mesh with the ground truth; adds "losses" to the report and to report.json, and prints them on stderr.
-  virtual absl::Status Account(const LocalSettings& settings, nlohmann::ordered_json& report) = 0;
+  // Compares the mesh with the ground truth and adds "losses" to the report.
+  virtual absl::Status Account(const std::string& ply_path, nlohmann::ordered_json& report) = 0;
+  // The same in words; "" before.
+  virtual const std::string& Words() const = 0;
 };
 
 // `ground_truth`: a PLY mesh. What is passed by reference must outlive the follower. Errors: bad input; Unimplemented

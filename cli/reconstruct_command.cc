@@ -65,6 +65,7 @@ void PrintSummary(const nlohmann::ordered_json& report, const LocalSettings& set
               FormatCount(report["mesh"]["vertices"].get<int64_t>()).c_str(),
               FormatCount(report["mesh"]["faces"].get<int64_t>()).c_str());
   std::printf("report   %s\n", settings.report_path.c_str());
+  if (!settings.page_path.empty()) std::printf("page     %s\n", settings.page_path.c_str());
   std::printf("cameras  %d processed\n", totals["cameras_processed"].get<int>());
   std::printf("rays     %s\n",
               DescribeShares(totals["share_covered_before"].get<double>(), totals["share_grown"].get<double>(),
@@ -140,17 +141,19 @@ int Reconstruct(Arguments& arguments) {
     losses = *std::move(followed);
     job = [&](const CameraJobInput& input, ThreadPool& pool) { return losses->RunJob(input, pool); };
     settings.accepted_listener = [&](const PatchLattice& accepted) { losses->RecordAccepted(accepted); };
+    settings.add_to_report = [&](const std::string& ply_path, nlohmann::ordered_json& to) {
+      return losses->Account(ply_path, to);
+    };
   }
   absl::StatusOr<nlohmann::ordered_json> report = ReconstructLocally(
       *scene, arguments.options, settings, job, [&](const LocalProgress& progress) { display.Show(progress); });
   display.End();
   if (!report.ok()) return Fail(report.status());
-  if (losses != nullptr) {
-    if (const absl::Status accounted = losses->Account(settings, *report); !accounted.ok()) return Fail(accounted);
-  }
+  if (losses != nullptr) std::fputs(losses->Words().c_str(), stderr);
   if (arguments.output.json) {
     report->erase("cameras");
     (*report)["report"] = settings.report_path;
+    if (!settings.page_path.empty()) (*report)["report_html"] = settings.page_path;
     PrintJson(*report);
   } else {
     PrintSummary(*report, settings);
@@ -186,6 +189,11 @@ void AddReconstructCommand(CLI::App& program, Run& run) {
   command.add_flag("--restart", arguments->settings.restart, "begin anew, whatever the work folder holds");
   command.add_option("--ground-truth", arguments->ground_truth,
                      "the true surface, a PLY mesh: say at which stage each of its pixels that is missing was lost");
+  command
+      .add_option("--report-html", arguments->settings.page_path,
+                  "also write the report as one HTML page: what of each photograph the mesh shows, where rays were "
+                  "lost, times, options, pictures")
+      ->type_name("FILE");
   AddThreadsOption(command, arguments->settings.threads);
   command
       .add_option("--memory", arguments->memory_mib,

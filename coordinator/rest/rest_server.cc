@@ -73,6 +73,7 @@ class RealRestServer final : public RestServer, private HttpHandler {
     context_.ready = services.ready;
     context_.options_json = services.options_json;
     context_.write_textured = services.write_textured;
+    context_.write_report = services.write_report;
   }
   ~RealRestServer() override { Shutdown(); }
 

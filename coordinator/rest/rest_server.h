@@ -41,6 +41,15 @@ struct TextureRequest {
 };
 using WriteTextured = std::function<absl::Status(const TextureRequest& request)>;
 
+// Writes the report of a reconstruction that is done as one HTML page.
+struct ReportRequest {
+  const v1::Reconstruction* reconstruction = nullptr;
+  std::string ply_path;
+  const Scene* scene = nullptr;  // image_path of each view is a file
+  std::string path;
+};
+using WriteReport = std::function<absl::Status(const ReportRequest& request)>;
+
 // What the server is a shell over. All of it outlives the server.
 struct RestServices {
   ReconstructionService* reconstructions = nullptr;
@@ -50,6 +59,7 @@ struct RestServices {
   std::function<absl::Status()> ready;  // whether store and blobs can be reached
   std::string options_json;             // the answer of GET /v1/options
   WriteTextured write_textured;
+  WriteReport write_report;
 };
 
 // The public interface over HTTP, as openapi.yaml says, and the dashboard's files: a thin shell over the service.

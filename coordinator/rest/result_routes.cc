@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <system_error>
 #include <utility>
@@ -123,6 +124,18 @@ absl::Status SendPartialMesh(const RestContext& context, RestCall& call, const M
   return SendFile(call, std::move(file), key, format.media_type, absl::StrCat(id, "-partial", format.ending));
 }
 
+// Calls `write` with the scene, whose photographs are files as long as it lasts, in a folder beside `path`.
+absl::Status WithSceneFiles(const RestContext& context, const std::string& id, const std::string& path,
+                            const std::function<absl::Status(const Scene& scene)>& write) {
+  const std::string folder = path + ".photographs";
+  absl::StatusOr<Scene> scene = context.reconstructions->LoadScene(id);
+  if (scene.ok()) scene = WithPhotographFiles(*std::move(scene), *context.blobs, folder);
+  const absl::Status written = scene.ok() ? write(*scene) : scene.status();
+  std::error_code error;
+  std::filesystem::remove_all(folder, error);
+  return written;
+}
+
 // The mesh, few triangles with a texture cut from the photographs.
 absl::Status SendTextured(const RestContext& context, RestCall& call, const MeshFormat& format) {
   const std::string& id = call.path.at("id");
@@ -130,22 +143,35 @@ absl::Status SendTextured(const RestContext& context, RestCall& call, const Mesh
   MW_ASSIGN_OR_RETURN(const std::string ply_path, context.reconstructions->MeshPath(id));
   const std::string key = absl::StrCat("textured-", format.name, "-", id, "-", reconstruction.mesh_sha256());
   MW_ASSIGN_OR_RETURN(auto file, context.textured->Get(key, [&](const std::string& path) -> absl::Status {
-    const std::string folder = path + ".photographs";
-    absl::StatusOr<Scene> scene = context.reconstructions->LoadScene(id);
-    if (scene.ok()) scene = WithPhotographFiles(*std::move(scene), *context.blobs, folder);
-    absl::Status written = scene.status();
-    if (written.ok()) {
-      written = context.write_textured({.ply_path = ply_path,
-                                        .scene = &*scene,
-                                        .options_json = reconstruction.options_json(),
-                                        .format = &format,
-                                        .path = path});
-    }
-    std::error_code error;
-    std::filesystem::remove_all(folder, error);
-    return written;
+    return WithSceneFiles(context, id, path, [&](const Scene& scene) {
+      return context.write_textured({.ply_path = ply_path,
+                                     .scene = &scene,
+                                     .options_json = reconstruction.options_json(),
+                                     .format = &format,
+                                     .path = path});
+    });
   }));
   return SendFile(call, std::move(file), key, format.media_type, absl::StrCat(id, "-textured", format.ending));
+}
+
+absl::Status ShowReport(const RestContext& context, RestCall& call) {
+  const std::string& id = call.path.at("id");
+  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, context.reconstructions->Get(id));
+  MW_ASSIGN_OR_RETURN(const std::string ply_path, context.reconstructions->MeshPath(id));
+  const std::string key = absl::StrCat("report-", id, "-", reconstruction.mesh_sha256());
+  MW_ASSIGN_OR_RETURN(auto file, context.textured->Get(key, [&](const std::string& path) -> absl::Status {
+    return WithSceneFiles(context, id, path, [&](const Scene& scene) {
+      return context.write_report(
+          {.reconstruction = &reconstruction, .ply_path = ply_path, .scene = &scene, .path = path});
+    });
+  }));
+  MW_RETURN_IF_ERROR(
+      SendFile(call, std::move(file), key, "text/html; charset=utf-8", absl::StrCat(id, "-report.html")));
+  // To be looked at, not saved; it has pictures and a style in itself and asks for nothing else.
+  call.response.headers.Set("Content-Disposition", "inline");
+  call.response.headers.Set("Content-Security-Policy",
+                            "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox");
+  return absl::OkStatus();
 }
 
 absl::StatusOr<const MeshFormat*> QueryFormat(const RestCall& call) {
@@ -203,6 +229,7 @@ void AddResultRoutes(const RestContext& context, std::vector<Route>& routes) {
   add("/v1/reconstructions/{id}/parts/{sequence}/preview", {"max_faces"}, PreviewPart);
   add("/v1/reconstructions/{id}/mesh", {"partial", "format", "texture"}, DownloadMesh);
   add("/v1/reconstructions/{id}/mesh.glb", {}, DownloadGlb);
+  add("/v1/reconstructions/{id}/report", {}, ShowReport);
   add("/v1/formats", {}, ListFormats);
 }
 

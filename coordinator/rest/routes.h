@@ -31,6 +31,7 @@ struct RestContext {
   std::function<absl::Status()> ready;
   std::string options_json;  // the answer of GET /v1/options
   WriteTextured write_textured;
+  WriteReport write_report;
 };
 
 // Handlers of the paths in the OpenAPI file, by what they are about.

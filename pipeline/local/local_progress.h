@@ -5,7 +5,7 @@
 
 namespace meshwright {
 
-enum class LocalStage { kChecking, kPairs, kCameras, kJudging, kJoining, kTexturing };
+enum class LocalStage { kChecking, kPairs, kCameras, kJudging, kJoining, kTexturing, kReporting };
 std::string NameOf(LocalStage stage);
 
 // What a progress display can show.

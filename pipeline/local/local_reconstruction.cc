@@ -11,9 +11,10 @@
 #include <absl/strings/str_format.h>
 
 #include "pipeline/config/parse_config.h"
-#include "pipeline/local/report.h"
 #include "pipeline/local/work_folder.h"
 #include "pipeline/options/options_json.h"
+#include "pipeline/report/cameras_report.h"
+#include "pipeline/report/report_page.h"
 #include "pipeline/texturing/texture_mesh.h"
 
 #include "common/base/bad_input.h"
@@ -142,7 +143,8 @@ class LocalReconstruction {
   absl::StatusOr<Json> Run() {
     MW_RETURN_IF_ERROR(options_.Validate());
     MW_ASSIGN_OR_RETURN(format_, MeshFormatOfPath(settings_.output_path));
-    for (const std::string& path : {settings_.output_path, settings_.report_path}) {
+    for (const std::string& path : {settings_.output_path, settings_.report_path, settings_.page_path}) {
+      if (path.empty()) continue;
       MW_RETURN_IF_ERROR(CheckIsNoPhotograph(scene_, path));
       MW_RETURN_IF_ERROR(CheckWritable(path));
     }
@@ -150,6 +152,7 @@ class LocalReconstruction {
     MW_RETURN_IF_ERROR(OpenWorkFolder());
     RemovePartialFiles(settings_.output_path);
     RemovePartialFiles(settings_.report_path);
+    if (!settings_.page_path.empty()) RemovePartialFiles(settings_.page_path);
     MW_RETURN_IF_ERROR(OpenLoop());
     absl::StatusOr<Json> report = RunJobsAndWriteResults();
     lease_->Release(clock_.Now()).IgnoreError();
@@ -313,8 +316,22 @@ class LocalReconstruction {
     }
     Json report = MakeReport(counts, std::move(cameras));
     if (!texture.is_null()) report["texture"] = std::move(texture);
+    if (settings_.add_to_report) MW_RETURN_IF_ERROR(settings_.add_to_report(ply_path, report));
     MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, JsonText(report, 2) + "\n"));
+    if (!settings_.page_path.empty()) MW_RETURN_IF_ERROR(WritePage(ply_path, report));
     return report;
+  }
+
+  absl::Status WritePage(const std::string& ply_path, const Json& report) {
+    Tell(LocalStage::kReporting, 0, 1);
+    const ReportPageInput input = {.title = fs::path(settings_.output_path).filename().string(),
+                                   .report = report,
+                                   .scene = scene_,
+                                   .ply_path = ply_path};
+    MW_ASSIGN_OR_RETURN(const std::string page, MakeReportPage(input, pool_));
+    MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.page_path, page));
+    Tell(LocalStage::kReporting, 1, 1);
+    return absl::OkStatus();
   }
 
   // What is to be told of the texture; null when there is none.
@@ -401,6 +418,8 @@ std::string NameOf(LocalStage stage) {
       return "joining the mesh";
     case LocalStage::kTexturing:
       return "cutting textures";
+    case LocalStage::kReporting:
+      return "drawing the report";
   }
   return "";
 }

@@ -27,6 +27,7 @@ struct LocalSettings {
   // with colours at its vertices.
   std::optional<TextureOptions> texture;
   std::string report_path;               // report.json
+  std::string page_path;                 // the report as one HTML page; "": none
   std::string parts_folder;              // one PLY per reference camera; "": none
   std::string work_folder;               // state and surfaces
   bool restart = false;                  // throw away what the work folder holds
@@ -35,6 +36,8 @@ struct LocalSettings {
   int64_t memory_limit_bytes = 1 << 30;  // how many jobs run at the same time follows from it
   // Told of every accepted surface M_r before the mesh is written; may be empty.
   std::function<void(const PatchLattice&)> accepted_listener;
+  // Adds what it knows to the report before that is written, with the whole mesh as PLY at hand; may be empty.
+  std::function<absl::Status(const std::string& ply_path, nlohmann::ordered_json& report)> add_to_report;
 };
 
 // The whole of section 3 of Jancosek et al. 2009 in one process: scene in, mesh and report.json out. May be killed at

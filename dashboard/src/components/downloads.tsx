@@ -66,6 +66,14 @@ export function Downloads({ base, reconstruction, hasParts }: Props) {
             'Accepted so far, PLY',
             'parts side by side, not joined',
           )}
+        {done && (
+          <li>
+            <a href={`${base}/report`} target="_blank" rel="noopener" onClick={close}>
+              <strong>Report, a page</strong>
+              <span class="muted small">what of each photograph the mesh shows, where rays were lost, times</span>
+            </a>
+          </li>
+        )}
         {done &&
           link(
             `${base}/parts`,

@@ -1,4 +1,4 @@
-#include "pipeline/local/report.h"
+#include "pipeline/report/cameras_report.h"
 
 #include <vector>
 
