@@ -221,15 +221,16 @@ class RealNodeOdmServer final : public NodeOdmServer, private HttpHandler {
   ~RealNodeOdmServer() override { Shutdown(); }
 
   absl::Status Open() {
-    MW_ASSIGN_OR_RETURN(board_, TaskBoard::Open(options_.folder, {.reconstructions = services_.reconstructions,
-                                                                  .gate = services_.gate,
-                                                                  .blobs = services_.blobs,
-                                                                  .options = &task_options_,
-                                                                  .clock = services_.clock,
-                                                                  .write_textured_glb = services_.write_textured_glb,
-                                                                  .can_estimate_cameras = [this] { return CanEstimateCameras(); },
-                                                                  .max_images = options_.max_images,
-                                                                  .warn = options_.warn}));
+    MW_ASSIGN_OR_RETURN(
+        board_, TaskBoard::Open(options_.folder, {.reconstructions = services_.reconstructions,
+                                                  .gate = services_.gate,
+                                                  .blobs = services_.blobs,
+                                                  .options = &task_options_,
+                                                  .clock = services_.clock,
+                                                  .write_textured_glb = services_.write_textured_glb,
+                                                  .can_estimate_cameras = [this] { return CanEstimateCameras(); },
+                                                  .max_images = options_.max_images,
+                                                  .warn = options_.warn}));
     const int cores = static_cast<int>(std::thread::hardware_concurrency());
     auto started = HttpServer::Start({.listen = options_.listen,
                                       .tls_certificate_file = options_.tls_certificate_file,
