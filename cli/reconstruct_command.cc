@@ -9,6 +9,7 @@
 
 #include "pipeline/local/local_reconstruction.h"
 #include "pipeline/local/time_estimate.h"
+#include "pipeline/local/verdict.h"
 #include "pipeline/options/option_table.h"
 
 #include "cli/camera_stage.h"
@@ -71,6 +72,10 @@ void PrintSummary(const nlohmann::ordered_json& report, const LocalSettings& set
               DescribeShares(totals["share_covered_before"].get<double>(), totals["share_grown"].get<double>(),
                              totals["share_accepted"].get<double>())
                   .c_str());
+  std::printf("verdict  %s\n", DescribeVerdict(report["verdict"]).c_str());
+  if (const std::string warning = DescribeWarning(report["verdict"]); !warning.empty()) {
+    std::printf("warning  %s\n", warning.c_str());
+  }
   std::printf("took     %s (%s of CPU), %s of memory at most\n",
               FormatDuration(process["wall_seconds"].get<double>()).c_str(),
               FormatDuration(process["cpu_seconds"].get<double>()).c_str(),

@@ -229,6 +229,10 @@ absl::StatusOr<FinalSurface> JudgeAgain(const PatchLattice& filtered, const Patc
   for (size_t node = 0; node < votes.size(); ++node) {
     const auto index = static_cast<int64_t>(node);
     const bool stays = IsAccepted(votes[node], options);
+    if (!stays && filtered.HasPatch(index)) {
+      const bool is_contradicted = votes[node].conflicts > 0 && votes[node].conflicts >= votes[node].support;
+      ++(is_contradicted ? surface.contradicted : surface.unsupported);
+    }
     if (!stays) ClearNode(index, surface.kept);
     if (!stays || accepted.HasPatch(index)) ClearNode(index, surface.late);
   }

@@ -50,6 +50,9 @@ absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int
 struct FinalSurface {
   PatchLattice kept;  // M_r less the patches that as many cameras look through as support
   PatchLattice late;  // what of F_r is not in M_r and has found its supporters since
+  // The other patches of F_r.
+  int64_t contradicted = 0;  // at least as many cameras look through them as support them, and at least one does
+  int64_t unsupported = 0;   // too few cameras found them, none of them speaks against
 };
 
 // Ours: asks all cameras. M_r was accepted by the cameras committed before r; those behind it may look through it, and

@@ -27,17 +27,17 @@ absl::Status AddSurface(const PatchLattice& surface, const AcceptedSurface& orig
 
 }  // namespace
 
-absl::StatusOr<std::vector<AcceptedSurface>> JudgeCommittedSurfaces(const std::vector<CommittedSurface>& committed,
-                                                                    const AcceptanceOptions& options, BlobStore& blobs,
-                                                                    const PutSurface& put, ThreadPool& pool,
-                                                                    const std::function<void(int judged)>& progress) {
+absl::StatusOr<JudgedSurfaces> JudgeCommittedSurfaces(const std::vector<CommittedSurface>& committed,
+                                                      const AcceptanceOptions& options, BlobStore& blobs,
+                                                      const PutSurface& put, ThreadPool& pool,
+                                                      const std::function<void(int judged)>& progress) {
   SurfaceCache cache(
       [&](const std::string& digest) -> absl::StatusOr<SparseSurface> {
         MW_ASSIGN_OR_RETURN(const std::string bytes, blobs.Get(digest));
         return DecodeSparseSurface(bytes);
       },
       kCacheBytes);
-  std::vector<AcceptedSurface> kept;
+  JudgedSurfaces result;
   std::vector<AcceptedSurface> late;
   for (size_t i = 0; i < committed.size(); ++i) {
     const CommittedSurface& surface = committed[i];
@@ -52,12 +52,16 @@ absl::StatusOr<std::vector<AcceptedSurface>> JudgeCommittedSurfaces(const std::v
     MW_ASSIGN_OR_RETURN(FinalSurface judged, JudgeAgain(lattice, accepted, static_cast<int>(surface.supporters.size()),
                                                         load, options, pool));
     RemoveSmallComponents(kMinLatePatches, judged.late);
-    MW_RETURN_IF_ERROR(AddSurface(judged.kept, surface.accepted, put, kept));
+    MW_RETURN_IF_ERROR(AddSurface(judged.kept, surface.accepted, put, result.surfaces));
     MW_RETURN_IF_ERROR(AddSurface(judged.late, surface.accepted, put, late));
+    result.cameras.push_back({.camera = surface.accepted.camera,
+                              .kept = judged.kept.CountPatches() + judged.late.CountPatches(),
+                              .contradicted = judged.contradicted,
+                              .unsupported = judged.unsupported});
     progress(static_cast<int>(i) + 1);
   }
-  kept.insert(kept.end(), late.begin(), late.end());
-  return kept;
+  result.surfaces.insert(result.surfaces.end(), late.begin(), late.end());
+  return result;
 }
 
 }  // namespace meshwright

@@ -368,11 +368,12 @@ absl::StatusOr<JoinedMeshCounts> ReconstructionDriver::TryToWriteMesh(const Reco
   };
   const std::vector<CommittedSurface> committed = conductor.CommittedSurfaces();
   MW_ASSIGN_OR_RETURN(
-      surfaces,
+      JudgedSurfaces judged_surfaces,
       JudgeCommittedSurfaces(committed, config.conductor.acceptance, blobs, put, *environment_.pool, [&](int judged) {
         joining.SetJudged(static_cast<double>(judged) / static_cast<double>(committed.size()));
         tell();
       }));
+  surfaces = std::move(judged_surfaces.surfaces);
   return WriteAcceptedMesh(surfaces, blobs, config.join, offset_, path, *environment_.pool, [&](double share) {
     joining.SetJoined(share);
     tell();

@@ -11,6 +11,7 @@
 #include <absl/strings/str_format.h>
 
 #include "pipeline/config/parse_config.h"
+#include "pipeline/local/verdict.h"
 #include "pipeline/local/work_folder.h"
 #include "pipeline/options/options_json.h"
 #include "pipeline/report/cameras_report.h"
@@ -275,7 +276,7 @@ class LocalReconstruction {
       Tell(stage, done, total);
     };
     tell(LocalStage::kJudging, 0, static_cast<int>(committed.size()));
-    MW_ASSIGN_OR_RETURN(const std::vector<AcceptedSurface> surfaces,
+    MW_ASSIGN_OR_RETURN(const JudgedSurfaces judged_surfaces,
                         JudgeCommittedSurfaces(
                             committed, options_.conductor.acceptance, *blobs_,
                             [&](const std::string& bytes) { return blobs_->Put(bytes); }, pool_,
@@ -283,6 +284,7 @@ class LocalReconstruction {
                               joining.SetJudged(static_cast<double>(judged) / static_cast<double>(committed.size()));
                               tell(LocalStage::kJudging, judged, static_cast<int>(committed.size()));
                             }));
+    const std::vector<AcceptedSurface>& surfaces = judged_surfaces.surfaces;
     const auto tell_joined = [&](double share) {
       joining.SetJoined(share);
       tell(LocalStage::kJoining, static_cast<int>(kThousandths * share), kThousandths);
@@ -290,6 +292,7 @@ class LocalReconstruction {
     tell_joined(0);
     MW_ASSIGN_OR_RETURN(Json cameras,
                         MakeCamerasReport(scene_, work_->store(), WorkFolder::kReconstructionId, &totals_));
+    cameras["verdict"] = MakeVerdict(judged_surfaces.cameras, cameras["cameras"]);
     if (surfaces.empty()) return absl::FailedPreconditionError(DescribeNothing(totals_, options_));
     if (!settings_.parts_folder.empty()) {
       MW_RETURN_IF_ERROR(WriteParts(scene_, surfaces, *blobs_, settings_.parts_folder));
@@ -372,6 +375,7 @@ class LocalReconstruction {
     if (!scene_.offset.isZero(0)) report["scene"]["offset"] = {scene_.offset.x(), scene_.offset.y(), scene_.offset.z()};
     report["options"] = ToJson(options_);
     report["options"].erase("method");
+    report["verdict"] = std::move(cameras["verdict"]);
     report["totals"] = std::move(cameras["totals"]);
     // Of this process; a resumed reconstruction's earlier processes took theirs.
     report["process"] = {{"threads", settings_.threads},

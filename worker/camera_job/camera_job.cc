@@ -7,6 +7,7 @@
 #include "common/base/clock.h"
 #include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
+#include "worker/filtering/epipolar_offsets.h"
 
 namespace meshwright {
 namespace {
@@ -92,6 +93,9 @@ CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJo
   fine_scoring.window_radius = options.filtering.refinement.window_radius;
   const PatchScorer fine_scorer = MakeScorer(input, fine_scoring);
   report.tentative_patches_scored += RefineSurface(fine_scorer, options.filtering.refinement, filtering.surface, pool);
+  const EpipolarOffsets offsets = MeasureEpipolarOffsets(scorer, filtering.surface, pool);
+  report.epipolar_squares = offsets.sum_of_squares;
+  report.epipolar_measurements = offsets.measurements;
   result.filtered =
       MakeFilteredSurface(filtering.surface, input.reference.camera_index, reference, *input.reference_color);
   report.rays_filtered = result.filtered.CountPatches();

@@ -63,8 +63,10 @@ struct CameraJobReport {
   int64_t seeds_from_points = 0;
   int64_t tentative_patches_scored = 0;
   int64_t patches_grown = 0;
-  int64_t rays_grown = 0;     // rays with at least one grown patch
-  int64_t rays_filtered = 0;  // rays with a patch in F_r
+  int64_t rays_grown = 0;       // rays with at least one grown patch
+  int64_t rays_filtered = 0;    // rays with a patch in F_r
+  double epipolar_squares = 0;  // of offsets across epipolar lines, px^2 summed over epipolar_measurements
+  int64_t epipolar_measurements = 0;
   double mrf_energy = 0;
   double mrf_lower_bound = 0;
   double seconds_visibility = 0;  // filled in by whoever makes V_r

@@ -39,6 +39,8 @@ Json MakeJobReport(const Scene& scene, const CameraJobSpec& spec, const CameraJo
   json["rays_covered_before"] = report.rays_covered_before;
   json["rays_grown"] = report.rays_grown;
   json["rays_filtered"] = report.rays_filtered;
+  json["epipolar_squares"] = report.epipolar_squares;
+  json["epipolar_measurements"] = report.epipolar_measurements;
   json["mrf_energy"] = report.mrf_energy;
   json["mrf_lower_bound"] = report.mrf_lower_bound;
   json["seconds"] = {{"loading", Rounded(seconds_loading)},

@@ -156,7 +156,8 @@ void PatchScorer::MakeWindow(int x, int y, Window& window) const {
   window.usable = true;
 }
 
-float PatchScorer::Score(const Window& window, int x, int y, const PatchPlane& plane, int target) const {
+float PatchScorer::Score(const Window& window, int x, int y, const PatchPlane& plane, int target,
+                         const Eigen::Vector2f& shift_px) const {
   if (!window.usable || !(plane.w > 0) || plane.w < window.min_w || plane.w > window.max_w) return kNoScore;
   const Target& geometry = geometry_[static_cast<size_t>(target)];
   const float x0 = static_cast<float>(x) + 0.5F;
@@ -166,6 +167,11 @@ float PatchScorer::Score(const Window& window, int x, int y, const PatchPlane& p
     input.c[i] = geometry.a(i, 0) * x0 + geometry.a(i, 1) * y0 + geometry.a(i, 2) + geometry.b(i) * plane.w;
     input.col0[i] = geometry.a(i, 0) + geometry.b(i) * plane.gx;
     input.col1[i] = geometry.a(i, 1) + geometry.b(i) * plane.gy;
+  }
+  for (int i = 0; i < 2; ++i) {
+    input.c[i] += shift_px[i] * input.c[2];
+    input.col0[i] += shift_px[i] * input.col0[2];
+    input.col1[i] += shift_px[i] * input.col1[2];
   }
   const auto radius = static_cast<float>(options_.window_radius);
   // The plane must lie in front of both cameras over the whole window: third coordinate and inverse depth are affine,
@@ -245,15 +251,25 @@ float PatchScorer::MeanScore(const Window& window, int x, int y, const PatchPlan
   return sigma != 0 ? sum / static_cast<float>(std::popcount(sigma)) : kNoScore;
 }
 
-float PatchScorer::PixelsPerInverseDepth(int x, int y, float inverse_depth, int target) const {
+Eigen::Vector2f PatchScorer::MovementPerInverseDepth(int x, int y, float inverse_depth, int target) const {
   const Target& geometry = geometry_[static_cast<size_t>(target)];
   const Eigen::Vector3f image =
       geometry.a * Eigen::Vector3f(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F, 1.0F) +
       geometry.b * inverse_depth;
   // Derivative of image.xy / image.z by inverse depth, where image moves by b.
-  const float dx = (geometry.b.x() - geometry.b.z() * image.x() / image.z()) / image.z();
-  const float dy = (geometry.b.y() - geometry.b.z() * image.y() / image.z()) / image.z();
-  return std::sqrt(dx * dx + dy * dy);
+  return {(geometry.b.x() - geometry.b.z() * image.x() / image.z()) / image.z(),
+          (geometry.b.y() - geometry.b.z() * image.y() / image.z()) / image.z()};
+}
+
+float PatchScorer::PixelsPerInverseDepth(int x, int y, float inverse_depth, int target) const {
+  const Eigen::Vector2f moved = MovementPerInverseDepth(x, y, inverse_depth, target);
+  return std::sqrt(moved.x() * moved.x() + moved.y() * moved.y());
+}
+
+Eigen::Vector2f PatchScorer::AcrossEpipolarLine(int x, int y, float inverse_depth, int target) const {
+  const Eigen::Vector2f moved = MovementPerInverseDepth(x, y, inverse_depth, target);
+  const float length = moved.norm();
+  return length > 0 ? Eigen::Vector2f(-moved.y() / length, moved.x() / length) : Eigen::Vector2f(0, 0);
 }
 
 }  // namespace meshwright

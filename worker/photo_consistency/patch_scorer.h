@@ -82,7 +82,9 @@ class PatchScorer {
   void MakeWindow(int x, int y, Window& window) const;
 
   // NCC in [-1, 1] between the window around the centre of pixel (x, y) and target i through the plane, or kNoScore.
-  float Score(const Window& window, int x, int y, const PatchPlane& plane, int target) const;
+  // `shift_px` moves the window's image in the target.
+  float Score(const Window& window, int x, int y, const PatchPlane& plane, int target,
+              const Eigen::Vector2f& shift_px = Eigen::Vector2f::Zero()) const;
 
   // q(p) of section 3.6: mean of the scores in the targets of `sigma` (bit i: target i), at least one. kNoScore when
   // any of them has none.
@@ -91,8 +93,14 @@ class PatchScorer {
   // How far the image of the pixel's ray point in target i moves per unit of inverse depth, px times scene units.
   float PixelsPerInverseDepth(int x, int y, float inverse_depth, int target) const;
 
+  // Unit vector in target i across the epipolar line of the pixel's ray, at the image of the ray's point; zero where
+  // that does not move with depth.
+  Eigen::Vector2f AcrossEpipolarLine(int x, int y, float inverse_depth, int target) const;
+
  private:
   struct Target;
+  // By how much that image moves per unit of inverse depth, px times scene units.
+  Eigen::Vector2f MovementPerInverseDepth(int x, int y, float inverse_depth, int target) const;
   // Sets the window's inverse depths; false when the ray of pixel (x, y) passes by the region.
   bool SetRange(int x, int y, Window& window) const;
 

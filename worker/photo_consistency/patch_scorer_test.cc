@@ -141,6 +141,40 @@ TEST(PatchScorer, PerfectMatchOfAViewWithItself) {
   EXPECT_NEAR(scorer.Score(window, 50, 50, {0.3F, 0.001F, -0.002F}, 0), 1.0F, 1e-4);
 }
 
+// A target whose photograph is moved by whole pixels: shifted by as much the window finds itself.
+TEST(PatchScorer, AShiftMovesTheWindowInTheTarget) {
+  const TwoViews views;
+  GreyImage moved = views.reference_image;
+  for (int y = 0; y < moved.height; ++y) {
+    for (int x = 0; x < moved.width; ++x) {
+      moved.grey[static_cast<size_t>(y * moved.width + x)] =
+          views.reference_image.At(std::max(0, x - 2), std::min(moved.height - 1, y + 3));
+    }
+  }
+  const PatchScorer scorer({views.reference, std::make_shared<SamplingImage>(views.reference_image, 1)},
+                           {{views.reference, std::make_shared<SamplingImage>(moved, 1)}}, {});
+  PatchScorer::Window window;
+  scorer.MakeWindow(50, 50, window);
+  const PatchPlane plane{0.3F, 0.001F, -0.002F};
+  EXPECT_NEAR(scorer.Score(window, 50, 50, plane, 0, {2, -3}), 1.0F, 1e-3);
+  EXPECT_LT(scorer.Score(window, 50, 50, plane, 0), 0.8F);
+}
+
+TEST(PatchScorer, AcrossTheEpipolarLineIsWhereDepthDoesNotLead) {
+  const TwoViews views;
+  const PatchScorer scorer = views.Scorer(3);
+  const auto image = [&](int x, int y, double w) {
+    return views.target.ProjectFromCam(views.target.CamFromWorld(views.reference.BackProject(x + 0.5, y + 0.5, 1 / w)));
+  };
+  for (const auto& [x, y] : {std::pair{20, 30}, {60, 50}, {100, 80}}) {
+    const Eigen::Vector2d along = image(x, y, 0.41) - image(x, y, 0.39);
+    const Eigen::Vector2f across = scorer.AcrossEpipolarLine(x, y, 0.4F, 0);
+    EXPECT_NEAR(across.norm(), 1, 1e-4);
+    EXPECT_NEAR(along.normalized().dot(across.cast<double>()), 0, 1e-3);
+    EXPECT_NEAR(scorer.PixelsPerInverseDepth(x, y, 0.4F, 0), along.norm() / 0.02, 1e-2 * along.norm() / 0.02);
+  }
+}
+
 TEST(PatchScorer, EveryInstructionSetGivesTheSameBits) {
   const TwoViews views;
   const PatchScorer scorer = views.Scorer(3);
