@@ -315,7 +315,8 @@ TEST_F(ReconstructionServiceTest, NobodyIsAtACameraOfWhatWasCancelled) {
   RunWorker("w", 2, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
   ASSERT_TRUE(service_->Cancel("wall").ok());
   int committed = 0;
-  for (const v1::Camera& camera : service_->ListCameras("wall")->cameras()) {
+  const v1::ListCamerasResponse listed = *service_->ListCameras("wall");
+  for (const v1::Camera& camera : listed.cameras()) {
     EXPECT_TRUE(camera.state() == v1::CAMERA_STATE_COMMITTED || camera.state() == v1::CAMERA_STATE_WAITING)
         << camera.name() << ": " << v1::CameraState_Name(camera.state());
     committed += camera.state() == v1::CAMERA_STATE_COMMITTED ? 1 : 0;
