@@ -9,8 +9,8 @@
 
 namespace meshwright {
 
-// How far cameras may seem to be off before it is worth a word, px. What is measured is less than what they are off: depth
-// takes up a part of it, and patches that do not agree at all are not there to be measured.
+// How far cameras may seem to be off before it is worth a word, px. What is measured is less than what they are off:
+// depth takes up a part of it, and patches that do not agree at all are not there to be measured.
 inline constexpr double kCamerasOffPx = 0.2;
 
 // What a run came to. Adds to each processed camera of `cameras` (the "cameras" of MakeCamerasReport) what has become
