@@ -22,12 +22,12 @@ constexpr char kPrefix[] = "MESHWRIGHT_";
 const std::vector<std::string>& KnownNames() {
   static const auto* const names = new std::vector<std::string>{
       // meshwright, meshwright-coordinator, meshwright-worker
-      "api-token-file", "blobs", "ca-file", "config", "coordinator", "coordinator-threads", "cores", "dashboard",
-      "data", "drain-seconds", "grpc-reflection", "insecure", "job-time-limit-seconds", "lease-seconds", "listen",
-      "memory", "metrics-listen", "nodeodm-listen", "nodeodm-max-images", "rest-listen", "rest-tls-cert",
-      "rest-tls-key", "trusted-proxy", "scene-root", "store", "tls-cert", "tls-key", "token-file", "user-gigabytes",
-      "user-reconstructions", "user-requests-per-second", "webhook-secret-file", "webhook-url", "worker-id",
-      "worker-token-file",
+      "api-token-file", "blobs", "ca-file", "client-ca-file", "client-cert", "client-key", "config", "coordinator",
+      "coordinator-threads", "cores", "dashboard", "data", "drain-seconds", "exit-when-idle", "grpc-reflection",
+      "insecure", "job-time-limit-seconds", "lease-seconds", "listen", "memory", "metrics-listen", "nodeodm-listen",
+      "nodeodm-max-images", "rest-listen", "rest-tls-cert", "rest-tls-key", "trusted-proxy", "scene-root", "store",
+      "tls-cert", "tls-key", "token-file", "user-gigabytes", "user-reconstructions", "user-requests-per-second",
+      "webhook-secret-file", "webhook-url", "worker-id", "worker-token-file",
       // docker-compose.yml
       "grafana-password", "grafana-port", "keys", "port", "postgres-password", "prometheus-port", "rest-port", "scenes",
       "worker-cores", "workers",
