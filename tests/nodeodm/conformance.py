@@ -314,10 +314,12 @@ class Conformance(unittest.TestCase):
             self.assertEqual(client.upload(uuid, one, name), {"success": True})
         client.commit(uuid)
         info = client.wait(uuid)
-        # a.png, a_.png with other bytes, and the third; neither their cameras nor anything to estimate them from.
-        self.assertEqual((info["imagesCount"], info["status"]["code"]), (3, FAILED), info)
-        self.assertRegex(info["status"]["errorMessage"], "photograph|COLMAP")
-        self.refused(lambda: client.get_json(f"/task/{uuid}/download/all.zip"), "Asset not ready")
+        # a.png, a_.png with other bytes, and the third. Where COLMAP is, it may make something of two places.
+        self.assertEqual(info["imagesCount"], 3, info)
+        if info["status"]["code"] != COMPLETED:
+            self.assertEqual(info["status"]["code"], FAILED, info)
+            self.assertRegex(info["status"]["errorMessage"], "photograph|COLMAP")
+            self.refused(lambda: client.get_json(f"/task/{uuid}/download/all.zip"), "Asset not ready")
         self.refused(lambda: client.get_json(f"/task/{uuid}/download/orthophoto.tif"), "Invalid asset")
         self.assertRegex("\n".join(client.output(uuid)), "gcp_list.txt is not used here")
         self.assertTrue(client.act("remove", uuid))
