@@ -21,8 +21,8 @@ constexpr absl::Duration kWriteEvery = absl::Milliseconds(50);
 
 // What judging again takes for each comparison, and the mesh for each accepted patch, by what acceptance takes for each
 // comparison: roughly, for JoiningProgress measures them once they run.
-constexpr double kJudgingByAcceptance = 1;
-constexpr double kJoiningByAcceptance = 30;
+constexpr double kJudgingByAcceptance = 0.15;
+constexpr double kJoiningByAcceptance = 8;
 
 std::string Name(SequenceNumber sequence) { return absl::StrCat("camera job ", sequence); }
 

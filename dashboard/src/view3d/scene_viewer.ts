@@ -280,6 +280,7 @@ export class SceneViewer {
   private measureAt(x: number, y: number) {
     const { clientWidth, clientHeight } = this.canvas;
     const ray = new Raycaster();
+    this.view.updateMatrixWorld(); // the frame that does it may still be to come
     ray.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.view);
     const { geometry } = this.parts.mesh;
     geometry.boundingSphere = this.partBox.getBoundingSphere(new Sphere());
