@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/camera_stage.h"
 
 #include <csignal>
@@ -88,4 +89,3 @@ int RunCameraStage(CameraEstimationSettings settings, const OutputSettings& outp
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdio>
@@ -34,4 +35,3 @@ class CameraStageDisplay {
 int RunCameraStage(CameraEstimationSettings settings, const OutputSettings& output, CameraEstimate* estimate);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

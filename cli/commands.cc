@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/commands.h"
 
 #include <algorithm>
@@ -83,4 +84,3 @@ absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -59,4 +60,3 @@ absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments);
 bool LacksCameras(const SceneArguments& arguments);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -92,4 +93,3 @@ void AddCropCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

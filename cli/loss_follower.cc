@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/loss_follower.h"
 
 #include <utility>
@@ -68,4 +69,3 @@ absl::StatusOr<std::unique_ptr<LossFollower>> FollowLosses(const std::string& gr
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -34,4 +35,3 @@ absl::StatusOr<std::unique_ptr<LossFollower>> FollowLosses(const std::string& gr
                                                            const ReconstructionOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

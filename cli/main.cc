@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 #include <new>
 
@@ -55,4 +56,3 @@ int main(int argc, char** argv) {
     return kExitFailed;
   }
 }
-// SPDX-License-Identifier: Apache-2.0

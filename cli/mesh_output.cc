@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/mesh_output.h"
 
 #include <filesystem>
@@ -54,4 +55,3 @@ absl::Status FetchMesh(ServiceClient& client, const std::string& id, const std::
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -13,4 +14,3 @@ namespace meshwright {
 absl::Status FetchMesh(ServiceClient& client, const std::string& id, const std::string& path, bool partial);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/progress_display.h"
 
 #include <algorithm>
@@ -124,4 +125,3 @@ std::string DescribeShares(double covered_before, double grown, double accepted)
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

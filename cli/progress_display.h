@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdio>
@@ -46,4 +47,3 @@ class ProgressDisplay {
 std::string DescribeShares(double covered_before, double grown, double accepted);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

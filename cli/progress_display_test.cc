@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/progress_display.h"
 
 #include <algorithm>
@@ -125,4 +126,3 @@ TEST(DescribeSharesTest, TheyAddUp) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

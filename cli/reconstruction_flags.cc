@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/reconstruction_flags.h"
 
 #include <string>
@@ -51,4 +52,3 @@ void AddReconstructionFlags(CLI::App& command, ReconstructionOptions& options) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

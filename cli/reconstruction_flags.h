@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,4 +12,3 @@ namespace meshwright {
 void AddReconstructionFlags(CLI::App& command, ReconstructionOptions& options);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -34,4 +35,3 @@ nlohmann::ordered_json ToJson(const v1::Reconstruction& reconstruction);
 int WatchUntilOver(const ServiceArguments& arguments, ServiceClient& client, const std::string& id);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

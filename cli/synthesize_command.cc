@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <memory>
 #include <optional>
 
@@ -92,4 +93,3 @@ void AddSynthesizeCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -138,4 +139,3 @@ void AddTextureCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

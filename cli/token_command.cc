@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <memory>
@@ -134,4 +135,3 @@ void AddTokenCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

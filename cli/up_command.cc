@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -114,4 +115,3 @@ void AddUpCommand(CLI::App& program, Run& run) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // In the place of tool_commands.cc and loss_follower.cc in a build without tools/.
 #include <string>
 
@@ -30,4 +31,3 @@ absl::StatusOr<std::unique_ptr<LossFollower>> FollowLosses(const std::string& /*
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "program/console.h"
 
 #include <cmath>
@@ -58,4 +59,3 @@ std::string FormatCount(int64_t count) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

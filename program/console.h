@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -37,4 +38,3 @@ std::string FormatBytes(double bytes);
 std::string FormatCount(int64_t count);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "program/environment.h"
 
 #include <algorithm>
@@ -76,4 +77,3 @@ absl::StatusOr<std::vector<Setting>> SettingsOfEnvironment(const std::vector<std
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -19,4 +20,3 @@ std::string EnvironmentNameOf(const std::string& setting);
 absl::StatusOr<std::vector<Setting>> SettingsOfEnvironment(const std::vector<std::string>& names);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

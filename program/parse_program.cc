@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "program/parse_program.h"
 
 #include <algorithm>
@@ -151,4 +152,3 @@ std::optional<int> ParseProgram(CLI::App& program, int argc, char** argv, const 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -15,4 +16,3 @@ namespace meshwright {
 std::optional<int> ParseProgram(CLI::App& program, int argc, char** argv, const std::function<absl::Status()>& check);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

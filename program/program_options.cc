@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "program/program_options.h"
 
 #include <csignal>
@@ -51,4 +52,3 @@ int WaitForStopSignal() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -30,4 +31,3 @@ void BlockStopSignals();
 int WaitForStopSignal();
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "program/settings_file.h"
 
 #include <algorithm>
@@ -63,4 +64,3 @@ absl::StatusOr<std::vector<Setting>> ParseSettingsFile(const std::string& path, 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

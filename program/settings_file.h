@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -19,4 +20,3 @@ struct Setting {
 absl::StatusOr<std::vector<Setting>> ParseSettingsFile(const std::string& path, const std::string& text);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

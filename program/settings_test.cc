@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Settings from files and from the environment, and what is said of wrong ones.
 
 #include <algorithm>
@@ -183,4 +184,3 @@ TEST(UsageErrorTest, UnknownCommandsAndOptionsAreNamedWithTheNearest) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

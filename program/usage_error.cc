@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "program/usage_error.h"
 
 #include <algorithm>
@@ -56,4 +57,3 @@ std::string DescribeUsageError(const CLI::App& program, const CLI::ParseError& e
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -11,4 +12,3 @@ namespace meshwright {
 std::string DescribeUsageError(const CLI::App& program, const CLI::ParseError& error);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

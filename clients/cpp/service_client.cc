@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "clients/cpp/service_client.h"
 
 #include <algorithm>
@@ -244,4 +245,3 @@ std::unique_ptr<ServiceClient> ServiceClient::Connect(const std::string& address
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/backoff.h"
 
 #include <algorithm>
@@ -17,4 +18,3 @@ absl::Duration Backoff::Next() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

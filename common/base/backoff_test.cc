@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/backoff.h"
 
 #include <limits>
@@ -40,4 +41,3 @@ TEST(BackoffTest, DelaysAreRandomWithinBoundsAndBeginAnewAfterASuccess) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

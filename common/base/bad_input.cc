@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/bad_input.h"
 
 #include <absl/strings/cord.h>
@@ -17,4 +18,3 @@ absl::Status BadInput(absl::Status status) {
 bool IsBadInput(const absl::Status& status) { return status.GetPayload(kBadInputUrl).has_value(); }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/status/status.h>
@@ -9,4 +10,3 @@ absl::Status BadInput(absl::Status status);
 bool IsBadInput(const absl::Status& status);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdio>
@@ -12,4 +13,3 @@
       std::abort();                                                                          \
     }                                                                                        \
   } while (false)
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/clock.h"
 
 #include <chrono>
@@ -18,4 +19,3 @@ const Clock& SystemClock() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

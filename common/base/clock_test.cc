@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/clock.h"
 
 #include <gtest/gtest.h>
@@ -31,4 +32,3 @@ TEST(StopwatchTest, MeasuresWhatPassedAndNotWhatWasSet) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

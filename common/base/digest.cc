@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/digest.h"
 
 #include <array>
@@ -54,4 +55,3 @@ std::string Sha256Hex(const std::string& bytes) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -31,4 +32,3 @@ class Sha256Stream {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

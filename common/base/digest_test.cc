@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/digest.h"
 
 #include <gtest/gtest.h>
@@ -22,4 +23,3 @@ TEST(Sha256, PiecesGiveTheDigestOfTheWhole) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

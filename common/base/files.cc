@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/files.h"
 
 #include <atomic>
@@ -203,4 +204,3 @@ void RemoveStalePartialFiles(const std::string& folder, absl::Time oldest) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

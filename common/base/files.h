@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -56,4 +57,3 @@ void RemovePartialFiles(const std::string& path);
 void RemoveStalePartialFiles(const std::string& folder, absl::Time oldest);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

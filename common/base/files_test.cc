@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/files.h"
 
 #include <chrono>
@@ -119,4 +120,3 @@ TEST_F(FilesTest, PartialFilesOfOnePathAreRemovedAlone) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

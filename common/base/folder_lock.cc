@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/folder_lock.h"
 
 #include <cerrno>
@@ -60,4 +61,3 @@ FolderLock::~FolderLock() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

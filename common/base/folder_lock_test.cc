@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/folder_lock.h"
 
 #include <csignal>
@@ -52,4 +53,3 @@ TEST(FolderLock, AFolderThatIsNotThereIsAnError) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

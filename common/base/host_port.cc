@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/host_port.h"
 
 #include <algorithm>
@@ -40,4 +41,3 @@ std::string ToString(const HostPort& address) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

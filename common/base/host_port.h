@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -20,4 +21,3 @@ std::string ToString(const HostPort& address);
 bool IsLoopbackHost(const std::string& host);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

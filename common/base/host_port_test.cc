@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/host_port.h"
 
 #include <gmock/gmock.h>
@@ -32,4 +33,3 @@ TEST(HostPortTest, WhatIsNoneIsNamed) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -13,4 +14,3 @@ using CameraIndex = int32_t;
 using SequenceNumber = int32_t;
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

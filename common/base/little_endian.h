@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -45,4 +46,3 @@ void AppendLittleEndian(T value, std::string& out) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/method_version.h"
 
 namespace meshwright {
@@ -5,4 +6,3 @@ namespace meshwright {
 const int kMethodVersion = 2;
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 namespace meshwright {
@@ -9,4 +10,3 @@ namespace meshwright {
 extern const int kMethodVersion;
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/nearest_name.h"
 
 #include <algorithm>
@@ -45,4 +46,3 @@ std::string DidYouMean(const std::string& word, const std::vector<std::string>& 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -13,4 +14,3 @@ std::string NearestName(const std::string& word, const std::vector<std::string>&
 std::string DidYouMean(const std::string& word, const std::vector<std::string>& names, const std::string& prefix = "");
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

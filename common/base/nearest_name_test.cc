@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/nearest_name.h"
 
 #include <gtest/gtest.h>
@@ -29,4 +30,3 @@ TEST(NearestNameTest, TheSentence) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/network_file_system.h"
 
 #include <algorithm>
@@ -33,4 +34,3 @@ bool IsOnNetworkFileSystem(const std::string& path) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

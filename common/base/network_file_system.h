@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -12,4 +13,3 @@ bool IsNetworkFileSystem(int64_t magic);
 bool IsOnNetworkFileSystem(const std::string& path);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/network_file_system.h"
 
 #include <gtest/gtest.h>
@@ -19,4 +20,3 @@ TEST(NetworkFileSystemTest, IsToldByTheNumberOfItsKind) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/opened_file.h"
 
 #include <cerrno>
@@ -30,4 +31,3 @@ absl::StatusOr<size_t> OpenedFile::Read(int64_t offset, char* bytes, size_t coun
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

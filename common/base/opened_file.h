@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -28,4 +29,3 @@ class OpenedFile {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

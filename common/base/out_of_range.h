@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -14,4 +15,3 @@ absl::Status OutOfRange(const std::string& field, const T& value, const std::str
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

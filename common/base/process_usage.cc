@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/process_usage.h"
 
 #include <sys/resource.h>
@@ -15,4 +16,3 @@ ProcessUsage MeasureProcessUsage() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -13,4 +14,3 @@ struct ProcessUsage {
 ProcessUsage MeasureProcessUsage();
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

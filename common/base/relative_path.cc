@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/relative_path.h"
 
 #include <vector>
@@ -30,4 +31,3 @@ absl::Status ValidateRelativePath(const std::string& path) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

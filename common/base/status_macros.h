@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <utility>
@@ -25,4 +26,3 @@
   declaration = std::move(name).value()
 
 // NOLINTEND(bugprone-macro-parentheses)
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdlib>
@@ -40,4 +41,3 @@ class TemporaryFolder {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/thread_pool.h"
 
 #include <algorithm>
@@ -85,4 +86,3 @@ void ThreadPool::ParallelFor(int64_t count, int64_t grain, const std::function<v
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/thread_pool.h"
 
 #include <atomic>
@@ -40,4 +41,3 @@ TEST(ThreadPool, SeveralCallersAndNestedLoops) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/token_file.h"
 
 #include <algorithm>
@@ -31,4 +32,3 @@ absl::StatusOr<std::string> ReadTokenFile(const std::string& path, const std::st
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

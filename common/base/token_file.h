@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -11,4 +12,3 @@ namespace meshwright {
 absl::StatusOr<std::string> ReadTokenFile(const std::string& path, const std::string& flag);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

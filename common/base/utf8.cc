@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/utf8.h"
 
 #include <cstddef>
@@ -53,4 +54,3 @@ std::string ToUtf8(std::string_view text) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

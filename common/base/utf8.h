@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -13,4 +14,3 @@ bool IsUtf8(std::string_view text);
 std::string ToUtf8(std::string_view text);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

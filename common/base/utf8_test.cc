@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/utf8.h"
 
 #include <gtest/gtest.h>
@@ -35,4 +36,3 @@ TEST(Utf8, WhateverTheBytesTheResultIsUtf8) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/base/version.h"
 
 namespace meshwright {
@@ -5,4 +6,3 @@ namespace meshwright {
 const char* const kProgramVersion = MW_VERSION;
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

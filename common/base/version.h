@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 namespace meshwright {
@@ -6,4 +7,3 @@ namespace meshwright {
 extern const char* const kProgramVersion;
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/blob_store.h"
 
 #include <algorithm>
@@ -41,4 +42,3 @@ absl::Status ValidateDigest(const std::string& digest, const std::string& name) 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -37,4 +38,3 @@ class BlobStore {
 absl::Status ValidateDigest(const std::string& digest, const std::string& name = "blob digest");
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -208,4 +209,3 @@ TEST_P(BlobStoreConformanceTest, ThreadsAndProcessesDoNotDisturbEachOther) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

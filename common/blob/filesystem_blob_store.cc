@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/filesystem_blob_store.h"
 
 #include <cerrno>
@@ -158,4 +159,3 @@ absl::Status FilesystemBlobStore::Delete(const std::string& digest) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -37,4 +38,3 @@ class FilesystemBlobStore : public BlobStore {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/filesystem_blob_store.h"
 
 #include <atomic>
@@ -104,4 +105,3 @@ TEST_F(FilesystemBlobStoreTest, FullDiskIsResourceExhaustedAndLeavesNothing) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

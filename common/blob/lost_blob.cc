@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/lost_blob.h"
 
 #include <optional>
@@ -34,4 +35,3 @@ std::string LostBlobOf(const absl::Status& status) {
 bool IsBlobLost(const absl::Status& status) { return absl::IsDataLoss(status) || absl::IsNotFound(status); }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

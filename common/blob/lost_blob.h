@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -36,4 +37,3 @@ std::string LostBlobOf(const absl::Status& status);
 bool IsBlobLost(const absl::Status& status);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/open_blob_store.h"
 
 #include <cstdlib>
@@ -44,4 +45,3 @@ absl::StatusOr<std::unique_ptr<BlobStore>> OpenBlobStore(const std::string& wher
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -19,4 +20,3 @@ absl::StatusOr<std::unique_ptr<BlobStore>> OpenBlobStore(const std::string& wher
 absl::StatusOr<S3Options> ParseS3Url(const std::string& url);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/s3_blob_store.h"
 
 #include <algorithm>
@@ -184,4 +185,3 @@ absl::Status S3BlobStore::Delete(const std::string& digest) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/s3_blob_store.h"
 
 #include <cstdlib>
@@ -203,4 +204,3 @@ TEST(S3CredentialsTest, ComeFromTheEnvironment) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/s3_client.h"
 
 #include <algorithm>
@@ -218,4 +219,3 @@ absl::Status S3Client::ErrorOf(const S3Request& request, const S3Response& respo
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

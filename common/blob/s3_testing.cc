@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/s3_testing.h"
 
 #include <cstdlib>
@@ -74,4 +75,3 @@ std::string S3Server::FileOf(const S3Options& options, const std::string& key) c
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -33,4 +34,3 @@ class S3Server {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/staged_blob.h"
 
 #include <algorithm>
@@ -112,4 +113,3 @@ absl::Status StagedBlob::Sync() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -53,4 +54,3 @@ class StagedBlob {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

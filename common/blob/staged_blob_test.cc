@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/blob/staged_blob.h"
 
 #include <filesystem>
@@ -66,4 +67,3 @@ TEST_F(StagedBlobTest, GoesOnBehindWhatIsKept) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <Eigen/Core>
@@ -53,4 +54,3 @@ struct Camera {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

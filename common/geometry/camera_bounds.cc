@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/geometry/camera_bounds.h"
 
 #include <cmath>
@@ -43,4 +44,3 @@ absl::Status CheckCamera(const Camera& camera) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

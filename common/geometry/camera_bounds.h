@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/status/status.h>
@@ -19,4 +20,3 @@ constexpr int kLargestImageSide = 1 << 17;   // px
 absl::Status CheckCamera(const Camera& camera);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/geometry/camera_bounds.h"
 
 #include <cmath>
@@ -61,4 +62,3 @@ TEST(CheckCamera, EveryNumberIsBoundedAndNamed) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/geometry/camera.h"
 
 #include <random>
@@ -62,4 +63,3 @@ TEST(LevelOfDetail, ProjectsToTheLatticeStep) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

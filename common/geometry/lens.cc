@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/geometry/lens.h"
 
 #include <algorithm>
@@ -177,4 +178,3 @@ Vector2d Lens::PlaneFromPixel(const Vector2d& pixel) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

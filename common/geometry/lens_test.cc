@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/geometry/lens.h"
 
 #include <cmath>
@@ -106,4 +107,3 @@ TEST(Lens, InverseStaysFiniteWhereTheModelHasNone) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

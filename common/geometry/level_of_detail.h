@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "common/geometry/camera.h"
@@ -11,4 +12,3 @@ inline double LevelOfDetail(const Camera& camera, double depth, double lattice_s
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

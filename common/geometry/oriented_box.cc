@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/geometry/oriented_box.h"
 
 #include <algorithm>
@@ -43,4 +44,3 @@ bool SeesAnyOf(const Camera& camera, const OrientedBox& box_in_world, int step) 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -34,4 +35,3 @@ std::optional<DepthInterval> DepthsInside(const OrientedBox& box_in_cam, const E
 bool SeesAnyOf(const Camera& camera, const OrientedBox& box_in_world, int step);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/geometry/oriented_box.h"
 
 #include <random>
@@ -49,4 +50,3 @@ TEST(OrientedBoxTest, ACameraSeesItOrNot) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <Eigen/Core>
@@ -22,4 +23,3 @@ inline Rigid3 Inverse(const Rigid3& b_from_a) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/byte_range.h"
 
 #include <algorithm>
@@ -41,4 +42,3 @@ ByteRange ParseByteRange(const std::string& header, int64_t size_bytes) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

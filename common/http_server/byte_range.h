@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -16,4 +17,3 @@ struct ByteRange {
 ByteRange ParseByteRange(const std::string& header, int64_t size_bytes);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/byte_range.h"
 
 #include <tuple>
@@ -50,4 +51,3 @@ TEST(ByteRangeTest, IsWhatTheRfcSays) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/connection.h"
 
 #include <algorithm>
@@ -231,4 +232,3 @@ void Connection::Close() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -147,4 +148,3 @@ void Connection::ReadSome(const Buffer& buffer, Handler handler) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

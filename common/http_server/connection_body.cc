@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The body of a request: it is read in pieces, each of which its sink takes on a worker thread before the next is read.
 #include <algorithm>
 #include <cstring>
@@ -151,4 +152,3 @@ void Connection::EndBody() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

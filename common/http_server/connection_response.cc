@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The answer to a request: its head, its body, whole, in pieces or as a stream of events, and what comes after it.
 #include <algorithm>
 #include <optional>
@@ -182,4 +183,3 @@ void Connection::Linger() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

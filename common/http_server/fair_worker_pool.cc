@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/fair_worker_pool.h"
 
 #include <utility>
@@ -70,4 +71,3 @@ void FairWorkerPool::Shutdown() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

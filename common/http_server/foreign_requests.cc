@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/foreign_requests.h"
 
 #include <absl/strings/ascii.h>
@@ -26,4 +27,3 @@ bool IsRebound(const HttpRequest& request, const std::string& listen, const std:
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

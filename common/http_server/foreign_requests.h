@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <set>
@@ -18,4 +19,3 @@ bool IsForeign(const HttpRequest& request);
 bool IsRebound(const HttpRequest& request, const std::string& listen, const std::set<std::string>& trusted_proxies);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

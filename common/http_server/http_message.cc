@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/http_message.h"
 
 #include <algorithm>
@@ -104,4 +105,3 @@ void HttpResponse::SetEvents(const std::string& content_type, std::unique_ptr<Ht
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -123,4 +124,3 @@ class HttpHandler {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/http_message.h"
 
 #include <gmock/gmock.h>
@@ -41,4 +42,3 @@ TEST(HttpMessageTest, FindsHeadersWhateverTheirCase) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/http_server.h"
 
 #include <algorithm>
@@ -184,4 +185,3 @@ absl::StatusOr<std::unique_ptr<HttpServer>> HttpServer::Start(const HttpServerOp
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

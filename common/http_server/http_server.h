@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -55,4 +56,3 @@ class HttpServer {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

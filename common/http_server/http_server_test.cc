@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The server held against clients that mean it harm. What it has to promise: every request is answered once, bodies are
 // never taken for requests, and whatever some clients do, the others are answered at once.
 
@@ -580,4 +581,3 @@ TEST_F(HttpServerTest, SpeaksTlsAndTakesUpANewCertificate) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

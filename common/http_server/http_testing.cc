@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/http_testing.h"
 
 #include <cerrno>
@@ -137,4 +138,3 @@ absl::Status WriteTestCertificate(const std::string& name, const std::string& ce
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

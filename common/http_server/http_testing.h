@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -43,4 +44,3 @@ absl::Status WriteTestCertificate(const std::string& name, const std::string& ce
                                   const std::string& key_file);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

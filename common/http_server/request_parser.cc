@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/request_parser.h"
 
 #include <algorithm>
@@ -156,4 +157,3 @@ bool RequestParser::DecodeChunked(const std::string& encoded, absl::Span<char> d
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

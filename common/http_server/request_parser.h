@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -61,4 +62,3 @@ class RequestParser final : private boost::beast::http::basic_parser<true> {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

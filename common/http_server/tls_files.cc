@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/http_server/tls_files.h"
 
 #include <utility>
@@ -73,4 +74,3 @@ std::shared_ptr<TlsFiles::Context> TlsFiles::Current() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -42,4 +43,3 @@ class TlsFiles {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

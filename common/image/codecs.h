@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -42,4 +43,3 @@ absl::StatusOr<ColorImage> DecodePnm(const std::string& bytes);
 absl::Status DecodePnmRows(const std::string& bytes, int min_width, RowSink& sink);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/color_image.h"
 
 namespace meshwright {
@@ -15,4 +16,3 @@ GreyImage ToGrey(const ColorImage& image) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -34,4 +35,3 @@ struct GreyImage {
 GreyImage ToGrey(const ColorImage& image);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/color_image.h"
 
 #include <cmath>
@@ -93,4 +94,3 @@ TEST(Remap, ReproducesQuadraticsAndFlatImages) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

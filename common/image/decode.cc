@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/decode.h"
 
 #include <algorithm>
@@ -143,4 +144,3 @@ absl::StatusOr<ColorImage> DecodeReduced(const std::string& bytes, const std::st
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

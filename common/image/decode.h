@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -34,4 +35,3 @@ absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std:
 absl::StatusOr<ColorImage> DecodeReduced(const std::string& bytes, const std::string& name, int width);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

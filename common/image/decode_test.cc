@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/decode.h"
 
 #include <cstdio>
@@ -343,4 +344,3 @@ TEST(WritePng, UnwritablePlaceIsNamed) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

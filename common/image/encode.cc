@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/encode.h"
 
 #include "common/base/files.h"
@@ -9,4 +10,3 @@ absl::Status WritePng(const std::string& path, const ColorImage& image) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -18,4 +19,3 @@ std::string EncodeJpeg(const ColorImage& image, int quality);
 absl::Status WritePng(const std::string& path, const ColorImage& image);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

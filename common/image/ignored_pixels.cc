@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/ignored_pixels.h"
 
 #include <algorithm>
@@ -36,4 +37,3 @@ ColorImage BlackAndWhite(ColorImage mask, int least_white) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -39,4 +40,3 @@ class IgnoredPixels {
 ColorImage BlackAndWhite(ColorImage mask, int least_white);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

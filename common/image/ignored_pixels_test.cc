@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/ignored_pixels.h"
 
 #include <gtest/gtest.h>
@@ -46,4 +47,3 @@ TEST(IgnoredPixelsTest, TheBrightestChannelCounts) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

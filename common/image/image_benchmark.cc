@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
 
 #include "common/image/decode.h"
@@ -60,4 +61,3 @@ BENCHMARK(BM_MakeSamplingImage)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

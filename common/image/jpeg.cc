@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
@@ -211,4 +212,3 @@ std::string EncodeJpeg(const ColorImage& image, int quality) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

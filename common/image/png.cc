@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
@@ -202,4 +203,3 @@ std::string EncodePng(const ColorImage& image) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

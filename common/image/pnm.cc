@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cctype>
 
@@ -102,4 +103,3 @@ absl::Status DecodePnmRows(const std::string& bytes, int, RowSink& sink) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/remap.h"
 
 #include <algorithm>
@@ -87,4 +88,3 @@ ColorImage Remap(const ColorImage& image, int width, int height, const SourceOfR
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -22,4 +23,3 @@ using SourceOfRow = std::function<void(int row, std::vector<SourcePosition>* sou
 ColorImage Remap(const ColorImage& image, int width, int height, const SourceOfRow& source_of_row);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/resize.h"
 
 #include <algorithm>
@@ -71,4 +72,3 @@ ColorImage ReduceByArea(const ColorImage& image, int width, int height) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/image/sampling_image.h"
 
 #include <algorithm>
@@ -62,4 +63,3 @@ int64_t SamplingImage::bytes() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -40,4 +41,3 @@ class SamplingImage {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

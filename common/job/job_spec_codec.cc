@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/job/job_spec_codec.h"
 
 #include <absl/strings/str_cat.h>
@@ -70,4 +71,3 @@ absl::StatusOr<std::vector<StoredPhotograph>> DecodePhotographs(const std::strin
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

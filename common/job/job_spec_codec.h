@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -36,4 +37,3 @@ std::string EncodePhotographs(const std::vector<StoredPhotograph>& photographs);
 absl::StatusOr<std::vector<StoredPhotograph>> DecodePhotographs(const std::string& json);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/job/job_spec_codec.h"
 
 #include <gmock/gmock.h>
@@ -38,4 +39,3 @@ TEST(JobSpecCodec, PhotographsComeBackAndNothingElseDoes) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/json/json_limits.h"
 
 #include <algorithm>
@@ -43,4 +44,3 @@ absl::Status CheckJsonLimits(const std::string& text, const JsonLimits& limits) 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

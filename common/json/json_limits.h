@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -19,4 +20,3 @@ struct JsonLimits {
 absl::Status CheckJsonLimits(const std::string& text, const JsonLimits& limits);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

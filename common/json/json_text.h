@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -13,4 +14,3 @@ std::string JsonText(const Json& json, int indent = -1) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -24,4 +25,3 @@ absl::StatusOr<Json> ParseJson(const std::string& text, const JsonLimits& limits
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

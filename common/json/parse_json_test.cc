@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/json/parse_json.h"
 
 #include <gmock/gmock.h>
@@ -51,4 +52,3 @@ TEST(ParseJsonTest, WhatIsNoJsonIsRefused) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

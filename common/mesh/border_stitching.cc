@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/border_stitching.h"
 
 #include <algorithm>
@@ -501,4 +502,3 @@ int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>&
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -142,4 +143,3 @@ class BorderStitcher {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

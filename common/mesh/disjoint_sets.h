@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -35,4 +36,3 @@ class DisjointSets {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

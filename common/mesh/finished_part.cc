@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/finished_part.h"
 
 #include <algorithm>
@@ -89,4 +90,3 @@ FinishedPart FinishPart(const SparseSurface& surface, const PartBorders::Part& p
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

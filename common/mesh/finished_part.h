@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -36,4 +37,3 @@ FinishedPart FinishPart(const SparseSurface& surface, const PartBorders::Part& p
 double TriangleArea(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

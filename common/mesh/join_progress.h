@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -43,4 +44,3 @@ class JoinProgress {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/joined_mesh.h"
 
 #include <algorithm>
@@ -355,4 +356,3 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -56,4 +57,3 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(
     const std::string& path, ThreadPool& pool, const JoinListener& listener = [](double) {});
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

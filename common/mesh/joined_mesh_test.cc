@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/joined_mesh.h"
 
 #include <algorithm>
@@ -445,4 +446,3 @@ TEST(JoinOptionsTest, RefusesValuesOutOfRange) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -58,4 +59,3 @@ BENCHMARK(BM_ReadPly)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

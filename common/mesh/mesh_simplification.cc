@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/mesh_simplification.h"
 
 #include <algorithm>
@@ -140,4 +141,3 @@ std::vector<Face> SimplifyFaces(const std::vector<Eigen::Vector3f>& positions, c
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

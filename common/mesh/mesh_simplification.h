@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -22,4 +23,3 @@ std::vector<std::array<uint32_t, 3>> SimplifyFaces(const std::vector<Eigen::Vect
                                                    const std::vector<std::pair<uint32_t, uint32_t>>& other_edges);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

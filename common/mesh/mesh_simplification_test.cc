@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/mesh_simplification.h"
 
 #include <algorithm>
@@ -150,4 +151,3 @@ TEST(SimplifyFacesTest, NothingStaysNothing) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

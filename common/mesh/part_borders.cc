@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/part_borders.h"
 
 #include <algorithm>
@@ -162,4 +163,3 @@ absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& lo
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -54,4 +55,3 @@ absl::Status ForEachPart(int64_t first, int64_t last, ThreadPool& pool,
 std::vector<std::pair<int64_t, int64_t>> BatchesOfParts(const std::vector<int64_t>& patches);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

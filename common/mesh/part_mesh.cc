@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/part_mesh.h"
 
 #include <algorithm>
@@ -131,4 +132,3 @@ PartMesh BuildPartMesh(const SparseSurface& surface, const std::vector<uint8_t>&
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

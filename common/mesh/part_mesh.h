@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -24,4 +25,3 @@ struct PartMesh {
 PartMesh BuildPartMesh(const SparseSurface& surface, const std::vector<uint8_t>& removed);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

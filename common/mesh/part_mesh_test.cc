@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/part_mesh.h"
 
 #include <set>
@@ -71,4 +72,3 @@ TEST(PartMeshTest, ComponentsAreWhatEdgesConnect) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/ply_header.h"
 
 #include <algorithm>
@@ -218,4 +219,3 @@ std::string FormatHeader(const PlyAttributes& attributes, int64_t vertices, int6
 }
 
 }  // namespace meshwright::ply
-// SPDX-License-Identifier: Apache-2.0

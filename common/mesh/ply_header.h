@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -53,4 +54,3 @@ absl::StatusOr<Header> ParseHeader(const std::string& bytes, const std::string& 
 std::string FormatHeader(const PlyAttributes& attributes, int64_t vertices, int64_t faces);
 
 }  // namespace meshwright::ply
-// SPDX-License-Identifier: Apache-2.0

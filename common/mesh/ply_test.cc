@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/ply.h"
 
 #include <algorithm>
@@ -323,4 +324,3 @@ TEST(ReadPly, HeadersAreReadInLinearTime) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

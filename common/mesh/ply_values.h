@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -116,4 +117,3 @@ class AsciiValues {
 };
 
 }  // namespace meshwright::ply
-// SPDX-License-Identifier: Apache-2.0

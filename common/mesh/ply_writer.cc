@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
@@ -203,4 +204,3 @@ absl::Status PlyStreamWriter::Commit() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/seam_blending.h"
 
 #include <algorithm>
@@ -77,4 +78,3 @@ void BlendSeams(const std::vector<SeamOffset>& offsets, int steps, const SparseS
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

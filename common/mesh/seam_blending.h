@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -22,4 +23,3 @@ void BlendSeams(const std::vector<SeamOffset>& offsets, int steps, const SparseS
                 std::vector<std::array<uint8_t, 3>>& colors);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/surface_mesh.h"
 
 #include <cstddef>
@@ -42,4 +43,3 @@ absl::Status WriteSurfacePart(const SparseSurface& surface, const Eigen::Vector3
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -22,4 +23,3 @@ inline absl::Status WriteSurfacePart(const PatchLattice& surface, const Eigen::V
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

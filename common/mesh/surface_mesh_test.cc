@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/surface_mesh.h"
 
 #include <filesystem>
@@ -68,4 +69,3 @@ TEST_F(SurfaceMeshTest, PartIsWrittenWhole) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/surface_overlap.h"
 
 #include <algorithm>
@@ -123,4 +124,3 @@ void MarkCovered(const SparseSurface& surface, const SparseSurface& cover, const
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

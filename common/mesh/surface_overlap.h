@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -46,4 +47,3 @@ void MarkCovered(const SparseSurface& surface, const SparseSurface& cover, const
                  double margin_steps, ThreadPool& pool, std::vector<uint8_t>& removed);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

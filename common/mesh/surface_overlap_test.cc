@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/surface_overlap.h"
 
 #include <algorithm>
@@ -91,4 +92,3 @@ TEST(SurfaceOverlapTest, PatchesTooFarFromThePlaneOrTurnedAwayStay) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -31,4 +32,3 @@ inline void ChangeOffset(const Eigen::Vector3d& offset, TriangleMesh& mesh) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -48,4 +49,3 @@ struct Scene {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/scene_check.h"
 
 #include <cstring>
@@ -102,4 +103,3 @@ absl::StatusOr<std::string> CheckAndDigestScene(const Scene& scene, ThreadPool& 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

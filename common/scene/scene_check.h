@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -17,4 +18,3 @@ absl::StatusOr<std::string> CheckAndDigestScene(const Scene& scene, ThreadPool& 
                                                 const std::function<void(int n)>& checked);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/scene_codec.h"
 
 #include <cstdint>
@@ -176,4 +177,3 @@ absl::StatusOr<Scene> DecodeScene(const std::string& bytes) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

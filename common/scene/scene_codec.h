@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -16,4 +17,3 @@ std::string EncodeScene(const Scene& scene);
 absl::StatusOr<Scene> DecodeScene(const std::string& bytes);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

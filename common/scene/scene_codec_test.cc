@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/scene_codec.h"
 
 #include <cmath>
@@ -59,4 +60,3 @@ TEST(SceneCodecTest, TruncatedOrFlippedBytesAreRefused) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

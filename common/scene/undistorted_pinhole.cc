@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/undistorted_pinhole.h"
 
 #include <algorithm>
@@ -124,4 +125,3 @@ Camera LargestPinhole(const Lens& lens) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

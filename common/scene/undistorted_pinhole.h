@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "common/geometry/camera.h"
@@ -13,4 +14,3 @@ namespace meshwright {
 Camera LargestPinhole(const Lens& lens);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/view.h"
 
 #include <algorithm>
@@ -117,4 +118,3 @@ absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& pictur
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

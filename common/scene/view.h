@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -39,4 +40,3 @@ absl::StatusOr<View> DecodeView(const SceneView& view, const std::string& pictur
 absl::StatusOr<ColorImage> DecodeMask(const SceneView& view, const std::string& mask_bytes);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/view.h"
 
 #include <cmath>
@@ -247,4 +248,3 @@ TEST(LoadView, AMaskOfAnotherShapeIsRefused) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/surface/codec.h"
 
 #include <algorithm>
@@ -305,4 +306,3 @@ absl::StatusOr<SparseSurface> DecodeSparseSurface(const std::string& bytes) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

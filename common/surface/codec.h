@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -21,4 +22,3 @@ absl::StatusOr<SparseSurface> DecodeSparseSurface(const std::string& bytes);
 absl::StatusOr<PatchLattice> DecodeSurface(const std::string& bytes);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

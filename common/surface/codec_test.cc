@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/surface/codec.h"
 
 #include <cmath>
@@ -181,4 +182,3 @@ TEST(SurfaceCodec, NumbersThatNoCameraHasAreDataLoss) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

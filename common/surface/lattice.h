@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -37,4 +38,3 @@ struct Lattice {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -59,4 +60,3 @@ struct PatchLattice {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

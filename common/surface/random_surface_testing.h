@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -49,4 +50,3 @@ inline PatchLattice RandomSurface(uint32_t seed, const Camera& camera, int step,
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

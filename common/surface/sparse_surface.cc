@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/surface/sparse_surface.h"
 
 #include <limits>
@@ -58,4 +59,3 @@ PatchFinder::PatchFinder(const SparseSurface& surface) : words_(static_cast<size
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -72,4 +73,3 @@ class PatchFinder {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/surface/sparse_surface.h"
 
 #include <tuple>
@@ -55,4 +56,3 @@ TEST(PatchFinder, FindsWhatASearchFinds) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
 
 #include "common/surface/codec.h"
@@ -33,4 +34,3 @@ BENCHMARK(BM_TriangulateLattice)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/surface/surface_cache.h"
 
 #include <utility>
@@ -30,4 +31,3 @@ absl::StatusOr<std::shared_ptr<const SparseSurface>> SurfaceCache::Get(const std
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -41,4 +42,3 @@ class SurfaceCache {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/surface/surface_cache.h"
 
 #include <atomic>
@@ -71,4 +72,3 @@ TEST(SurfaceCache, ManyThreadsMayAsk) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

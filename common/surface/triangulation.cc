@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/surface/triangulation.h"
 
 #include <cmath>
@@ -77,4 +78,3 @@ std::vector<std::array<int32_t, 3>> Triangulate(const SparseSurface& surface) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

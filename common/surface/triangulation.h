@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -14,4 +15,3 @@ namespace meshwright {
 // diagonal of a full cell joins the pair of corners with the smaller difference in depth.
 std::vector<std::array<int32_t, 3>> Triangulate(const SparseSurface& surface);
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

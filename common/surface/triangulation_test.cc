@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -143,4 +144,3 @@ TEST(TriangulateLattice, CutAlongAColumnGivesTwoPieces) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

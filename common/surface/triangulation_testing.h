@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -22,4 +23,3 @@ inline std::vector<std::array<int32_t, 3>> TriangulateLattice(const PatchLattice
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/telemetry/log.h"
 
 #include <cstdio>
@@ -95,4 +96,3 @@ void Logger::Log(LogLevel level, const std::string& message, const LogFields& fi
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/telemetry/log.h"
 
 #include <string>
@@ -74,4 +75,3 @@ TEST_F(LogTest, ThreadsDoNotMixLines) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

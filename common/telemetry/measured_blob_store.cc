@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/telemetry/measured_blob_store.h"
 
 #include <filesystem>
@@ -79,4 +80,3 @@ absl::Status MeasuredBlobStore::Delete(const std::string& digest) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -33,4 +34,3 @@ class MeasuredBlobStore final : public BlobStore {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/telemetry/measured_blob_store.h"
 
 #include <filesystem>
@@ -43,4 +44,3 @@ TEST(MeasuredBlobStoreTest, PassesThroughAndCounts) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/telemetry/metrics.h"
 
 #include <cmath>
@@ -87,4 +88,3 @@ void CallMetrics::Record(const std::string& operation, absl::Duration took, cons
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -61,4 +62,3 @@ class CallMetrics {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/telemetry/metrics_server.h"
 
 #include <utility>
@@ -75,4 +76,3 @@ absl::StatusOr<std::unique_ptr<MetricsServer>> MetricsServer::Start(const std::s
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

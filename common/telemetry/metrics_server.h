@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -24,4 +25,3 @@ class MetricsServer {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/telemetry/metrics_server.h"
 
 #include <string>
@@ -73,4 +74,3 @@ TEST(MetricsServerTest, ManyScrapersAreAnswered) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/telemetry/metrics.h"
 
 #include <cstdlib>
@@ -65,4 +66,3 @@ TEST(MetricsTest, CallsAreTimedAndOnlyFailuresCountAsErrors) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/telemetry/process_metrics.h"
 
 #include <filesystem>
@@ -99,4 +100,3 @@ std::vector<MetricFamily> ProcessMetrics::Collect() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

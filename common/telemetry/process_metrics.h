@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -16,4 +17,3 @@ class ProcessMetrics : public prometheus::Collectable {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/xml/xml_element.h"
 
 #include <algorithm>
@@ -101,4 +102,3 @@ absl::StatusOr<XmlElement> ParseXml(const std::string& text) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

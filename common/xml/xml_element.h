@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -30,4 +31,3 @@ struct XmlElement {
 absl::StatusOr<XmlElement> ParseXml(const std::string& text);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

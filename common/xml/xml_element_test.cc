@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/xml/xml_element.h"
 
 #include <gmock/gmock.h>
@@ -53,4 +54,3 @@ TEST(ParseXmlTest, DepthIsLimitedAndThereAreNoEntities) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

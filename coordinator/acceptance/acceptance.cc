@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/acceptance/acceptance.h"
 
 #include <algorithm>
@@ -274,4 +275,3 @@ int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -66,4 +67,3 @@ absl::StatusOr<FinalSurface> JudgeAgain(const PatchLattice& filtered, const Patc
 int64_t RemoveSmallComponents(int64_t min_patches, PatchLattice& surface);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <memory>
 #include <vector>
 
@@ -37,4 +38,3 @@ BENCHMARK(BM_AcceptSurface)->ArgsProduct({{0, 1}, {1, 2}})->Unit(benchmark::kMil
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/acceptance/acceptance.h"
 
 #include <algorithm>
@@ -259,4 +260,3 @@ TEST(Acceptance, PatchesAtOrBehindASupporterGetNoVote) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/api/guarded_calls.h"
 
 #include "common/base/status_macros.h"
@@ -25,4 +26,3 @@ absl::StatusOr<v1::ListReconstructionsResponse> ListFor(const Caller& caller, co
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

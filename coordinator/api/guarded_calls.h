@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -23,4 +24,3 @@ absl::StatusOr<v1::ListReconstructionsResponse> ListFor(const Caller& caller, co
                                                         const v1::ListReconstructionsRequest& request);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

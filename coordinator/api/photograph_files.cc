@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/api/photograph_files.h"
 
 #include <filesystem>
@@ -27,4 +28,3 @@ absl::StatusOr<Scene> WithPhotographFiles(Scene scene, BlobStore& blobs, const s
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -14,4 +15,3 @@ namespace meshwright {
 absl::StatusOr<Scene> WithPhotographFiles(Scene scene, BlobStore& blobs, const std::string& folder);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

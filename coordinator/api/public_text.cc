@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/api/public_text.h"
 
 #include <algorithm>
@@ -35,4 +36,3 @@ std::string WithoutServerPaths(const std::string& text) {
 
 }  // namespace meshwright
 
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -10,4 +11,3 @@ std::string WithoutServerPaths(const std::string& text);
 
 }  // namespace meshwright
 
-// SPDX-License-Identifier: Apache-2.0

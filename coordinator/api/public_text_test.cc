@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/api/public_text.h"
 
 #include <gtest/gtest.h>
@@ -22,4 +23,3 @@ TEST(PublicTextTest, TellsNothingOfTheServersFolders) {
 }  // namespace
 }  // namespace meshwright
 
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/api/reconstruction_record.h"
 
 #include <algorithm>
@@ -110,4 +111,3 @@ absl::Status ValidateReconstructionId(const std::string& id) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

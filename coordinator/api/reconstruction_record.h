@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -21,4 +22,3 @@ v1::Attempt ToProto(const std::string& reconstruction, const Attempt& attempt);
 absl::Status ValidateReconstructionId(const std::string& id);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

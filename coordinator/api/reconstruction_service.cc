@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/api/reconstruction_service.h"
 
 #include <algorithm>
@@ -570,4 +571,3 @@ void ReconstructionService::Shutdown() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

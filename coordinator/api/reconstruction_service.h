@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -134,4 +135,3 @@ class ReconstructionService {
 bool IsOver(v1::ReconstructionState state);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

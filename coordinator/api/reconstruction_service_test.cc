@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/api/reconstruction_service.h"
 
 #include <cstdlib>
@@ -450,4 +451,3 @@ TEST_F(ReconstructionServiceTest, AnUploadIsThereWholeOrNotAtAll) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

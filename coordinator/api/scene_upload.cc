@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/api/scene_upload.h"
 
 #include <filesystem>
@@ -59,4 +60,3 @@ absl::Status SceneFileUpload::Finish() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

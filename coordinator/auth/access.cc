@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/auth/access.h"
 
 #include <array>
@@ -79,4 +80,3 @@ bool MaySee(const Caller& caller, const std::string& reconstruction_id, const st
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

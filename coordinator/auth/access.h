@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -47,4 +48,3 @@ absl::Status CheckRole(const Caller& caller, Action action);
 bool MaySee(const Caller& caller, const std::string& reconstruction_id, const std::string& owner);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

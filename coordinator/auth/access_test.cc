@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/auth/access.h"
 
 #include <gtest/gtest.h>
@@ -74,4 +75,3 @@ TEST(RequestRateTest, ABurstThenTheRate) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/auth/gatekeeper.h"
 
 #include <optional>
@@ -231,4 +232,3 @@ absl::Status Gatekeeper::Revoke(const Caller& caller, const std::string& id) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

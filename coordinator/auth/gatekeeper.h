@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -126,4 +127,3 @@ class Gatekeeper {
 absl::Status NoSuchReconstruction(const std::string& id);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

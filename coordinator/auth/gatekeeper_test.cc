@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/auth/gatekeeper.h"
 
 #include <gmock/gmock.h>
@@ -195,4 +196,3 @@ TEST_F(GatekeeperTest, UsersHavePlainNames) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

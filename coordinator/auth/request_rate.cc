@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/auth/request_rate.h"
 
 #include <algorithm>
@@ -27,4 +28,3 @@ bool RequestRate::Take(const std::string& caller, absl::Time now) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/auth/token_text.h"
 
 #include <algorithm>
@@ -48,4 +49,3 @@ bool EqualInConstantTime(const std::string& a, const std::string& b) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -21,4 +22,3 @@ std::optional<TokenText> ParseToken(const std::string& text);
 bool EqualInConstantTime(const std::string& a, const std::string& b);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

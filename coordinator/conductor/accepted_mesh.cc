@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/accepted_mesh.h"
 
 #include "common/base/status_macros.h"
@@ -32,4 +33,3 @@ absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(const std::vector<AcceptedSur
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

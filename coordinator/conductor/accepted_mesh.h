@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -23,4 +24,3 @@ absl::StatusOr<JoinedMeshCounts> WriteAcceptedMesh(
     const JoinListener& listener = [](double) {});
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

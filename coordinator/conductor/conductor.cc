@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/conductor.h"
 
 #include <algorithm>
@@ -481,4 +482,3 @@ std::vector<CommittedSurface> Conductor::CommittedSurfaces() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -176,4 +177,3 @@ class Conductor {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

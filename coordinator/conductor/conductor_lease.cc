@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/conductor_lease.h"
 
 #include <utility>
@@ -36,4 +37,3 @@ absl::Status HeldConductorLease::Release(absl::Time now) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -39,4 +40,3 @@ class HeldConductorLease {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/conductor.h"
 
 #include <algorithm>
@@ -421,4 +422,3 @@ TEST_F(ConductorTest, OptionsAreChecked) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

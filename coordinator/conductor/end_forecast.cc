@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/end_forecast.h"
 
 #include <algorithm>
@@ -59,4 +60,3 @@ absl::StatusOr<absl::Time> EndForecast::ExpectedEnd() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/final_surfaces.h"
 
 #include <cstdint>
@@ -65,4 +66,3 @@ absl::StatusOr<JudgedSurfaces> JudgeCommittedSurfaces(const std::vector<Committe
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -39,4 +40,3 @@ absl::StatusOr<JudgedSurfaces> JudgeCommittedSurfaces(
     const PutSurface& put, ThreadPool& pool, const std::function<void(int judged)>& progress = [](int) {});
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/joining_progress.h"
 
 #include <algorithm>
@@ -46,4 +47,3 @@ double JoiningProgress::seconds_left() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/joining_progress.h"
 
 #include <cmath>
@@ -63,4 +64,3 @@ TEST(JoiningProgressTest, NothingIsSaidWhereNothingIsKnown) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

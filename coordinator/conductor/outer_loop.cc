@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/outer_loop.h"
 
 #include <utility>
@@ -135,4 +136,3 @@ absl::StatusOr<bool> OuterLoop::RunAgain(SequenceNumber sequence, const std::str
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -84,4 +85,3 @@ class OuterLoop {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -29,4 +30,3 @@ struct ReconstructionConfig {
 using ParseReconstructionConfig = std::function<absl::StatusOr<ReconstructionConfig>(const std::string& options_json)>;
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

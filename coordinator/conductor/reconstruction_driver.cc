@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/reconstruction_driver.h"
 
 #include <algorithm>
@@ -413,4 +414,3 @@ absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionC
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

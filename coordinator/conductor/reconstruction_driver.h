@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -130,4 +131,3 @@ class ReconstructionDriver {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

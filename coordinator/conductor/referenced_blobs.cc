@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/referenced_blobs.h"
 
 #include <absl/strings/str_cat.h>
@@ -41,4 +42,3 @@ absl::Status ReferencedBlobs::Adopt(const std::string& path, const std::string& 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -33,4 +34,3 @@ class ReferencedBlobs {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/conductor/scene_ingestion.h"
 
 #include <cstdint>
@@ -189,4 +190,3 @@ absl::Status MaterializeScene(const std::vector<SceneFile>& files, BlobStore& bl
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -43,4 +44,3 @@ absl::StatusOr<IngestedScene> IngestScene(Scene scene, const std::string& folder
 absl::Status MaterializeScene(const std::vector<SceneFile>& files, BlobStore& blobs, const std::string& folder);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/time/time.h>
@@ -12,4 +13,3 @@ inline void FillTime(absl::Time time, google::protobuf::Timestamp& timestamp) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "coordinator/store/job_store.h"
@@ -9,4 +10,3 @@ inline SequenceNumber PublicSequence(SequenceNumber sequence) { return sequence 
 inline CameraIndex PublicCamera(CameraIndex camera) { return camera == kCameraEstimation ? -1 : camera; }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

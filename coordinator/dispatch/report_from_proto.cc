@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/dispatch/report_from_proto.h"
 
 #include <utility>
@@ -51,4 +52,3 @@ WorkerReport FromProto(const v1::SynchronizeRequest& request) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "meshwright/v1/worker.pb.h"
@@ -12,4 +13,3 @@ JobKey FromProto(const v1::JobKey& key);
 WorkerReport FromProto(const v1::SynchronizeRequest& request);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/dispatch/worker_service.h"
 
 #include <algorithm>
@@ -595,4 +596,3 @@ v1::ListWorkersResponse WorkerService::ListWorkers() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <chrono>
@@ -139,4 +140,3 @@ class WorkerService {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/dispatch/worker_service.h"
 
 #include <cstdlib>
@@ -347,4 +348,3 @@ TEST_F(WorkerServiceTest, BadRequestsNameTheField) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

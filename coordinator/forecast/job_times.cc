@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/forecast/job_times.h"
 
 #include <algorithm>
@@ -38,4 +39,3 @@ JobTimes TimesOfReport(const std::string& report_json) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -18,4 +19,3 @@ struct JobTimes {
 JobTimes TimesOfReport(const std::string& report_json);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/forecast/surface_to_grow.h"
 
 #include <algorithm>
@@ -83,4 +84,3 @@ double SurfaceToGrow::ExpectedShare(CameraIndex camera) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -49,4 +50,3 @@ class SurfaceToGrow {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

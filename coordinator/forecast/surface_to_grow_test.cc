@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/forecast/surface_to_grow.h"
 
 #include <algorithm>
@@ -93,4 +94,3 @@ TEST(SurfaceToGrowTest, ItFallsAsSurfaceFills) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

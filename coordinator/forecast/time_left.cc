@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/forecast/time_left.h"
 
 #include <algorithm>
@@ -39,4 +40,3 @@ double CameraSecondsLeft(const JobRate& rate, const CameraWork& left, double don
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "coordinator/forecast/job_times.h"
@@ -38,4 +39,3 @@ double CameraSecondsLeft(const JobRate& rate, const CameraWork& left, double don
                          double elapsed_seconds);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/forecast/time_left.h"
 
 #include <cstdint>
@@ -85,4 +86,3 @@ TEST(CameraSecondsLeftTest, NothingIsSaidBeforeTheFirstIsDone) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

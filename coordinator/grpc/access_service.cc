@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/grpc/access_service.h"
 
 #include <utility>
@@ -85,4 +86,3 @@ class AccessServiceImpl final : public v1::AccessService::Service {
 std::unique_ptr<grpc::Service> MakeAccessService(Gatekeeper& gate) { return std::make_unique<AccessServiceImpl>(gate); }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

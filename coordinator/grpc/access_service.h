@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -12,4 +13,3 @@ namespace meshwright {
 std::unique_ptr<grpc::Service> MakeAccessService(Gatekeeper& gate);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/grpc/grpc_gate.h"
 
 #include <memory>
@@ -81,4 +82,3 @@ void LongCalls::End(const std::string& caller) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <map>
@@ -53,4 +54,3 @@ class LongCalls {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/grpc/grpc_server.h"
 
 #include <algorithm>
@@ -439,4 +440,3 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const GrpcServerOp
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

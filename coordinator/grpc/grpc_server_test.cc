@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/grpc/grpc_server.h"
 
 #include <atomic>
@@ -350,4 +351,3 @@ TEST_F(GrpcServerTest, APortThatIsTakenIsNamed) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which worker is which: nobody stops another's worker, or works in its name, by calling itself the same.
 
 #include <atomic>
@@ -219,4 +220,3 @@ TEST_F(WorkerCertificateTest, CertificatesOfOthersEndTheConnection) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/ball_grid.h"
 
 #include <algorithm>
@@ -74,4 +75,3 @@ void BallGrid::FindMeeting(CameraIndex camera, std::vector<CameraIndex>& meeting
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/camera_probes.h"
 
 #include <algorithm>
@@ -138,4 +139,3 @@ std::vector<CameraProbes> ProbesFromDepths(const std::vector<CameraGeometry>& ca
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

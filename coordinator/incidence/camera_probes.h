@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -45,4 +46,3 @@ std::vector<CameraProbes> ProbesFromDepths(const std::vector<CameraGeometry>& ca
                                            const std::vector<double>& typical_depths);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <Eigen/Core>
@@ -21,4 +22,3 @@ inline Camera CameraLookingAt(const Eigen::Vector3d& center_in_world, const Eige
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

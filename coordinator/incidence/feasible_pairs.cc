@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/feasible_pairs.h"
 
 #include <cmath>
@@ -138,4 +139,3 @@ absl::StatusOr<FeasiblePairs> FindFeasiblePairs(const std::vector<Camera>& camer
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

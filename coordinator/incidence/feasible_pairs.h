@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -76,4 +77,3 @@ absl::StatusOr<FeasiblePairs> FindFeasiblePairs(const std::vector<Camera>& camer
                                                 const FeasiblePairOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/feasible_pairs.h"
 
 #include <algorithm>
@@ -224,4 +225,3 @@ TEST(FeasiblePairs, OptionsNameWhatIsWrong) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/incidence_matrix.h"
 
 #include <algorithm>
@@ -49,4 +50,3 @@ int64_t IncidenceMatrix::CountBits() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -34,4 +35,3 @@ class IncidenceMatrix {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/incidence_matrix.h"
 
 #include <random>
@@ -59,4 +60,3 @@ TEST(IncidenceMatrix, ClearingARowLeavesTheColumn) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/overlap_graph.h"
 
 #include <algorithm>
@@ -69,4 +70,3 @@ OverlapGraph FindOverlaps(const std::vector<CameraGeometry>& cameras, const std:
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <utility>
@@ -45,4 +46,3 @@ OverlapGraph FindOverlaps(const std::vector<CameraGeometry>& cameras, const std:
                           const IncidenceMatrix& feasible, const OverlapOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/overlap_graph.h"
 
 #include <algorithm>
@@ -73,4 +74,3 @@ TEST(OverlapGraph, LongStreetsStayQuick) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

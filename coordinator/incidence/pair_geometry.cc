@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/pair_geometry.h"
 
 #include <algorithm>
@@ -79,4 +80,3 @@ PairOutcome TestTransversal(const CameraGeometry& a, const CameraGeometry& b, co
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -61,4 +62,3 @@ PairOutcome TestTransversal(const CameraGeometry& a, const CameraGeometry& b, co
                             Eigen::Vector3d& midpoint_in_world);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -38,4 +39,3 @@ std::vector<PairRow> PairsWithoutPoints(const std::vector<CameraGeometry>& camer
                                         double min_common_view, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdint>
 #include <utility>
@@ -124,4 +125,3 @@ std::vector<PairRow> PairsWithoutPoints(const std::vector<CameraGeometry>& camer
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdint>
 
@@ -97,4 +98,3 @@ std::vector<PairRow> PairsFromPoints(const std::vector<CameraGeometry>& cameras,
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The paper's own photographs: feasible pairs and overlaps as a person would judge them.
 #include <algorithm>
 #include <cmath>
@@ -143,4 +144,3 @@ TEST_F(RealScene, TempleRings) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/target_selection.h"
 
 #include <algorithm>
@@ -103,4 +104,3 @@ std::vector<CameraIndex> ChooseTargets(CameraIndex reference, const std::vector<
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

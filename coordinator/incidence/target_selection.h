@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -30,4 +31,3 @@ std::vector<CameraIndex> ChooseTargets(CameraIndex reference, const std::vector<
                                        const std::vector<CameraProbes>& probes, const TargetSelectionOptions& options);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/incidence/target_selection.h"
 
 #include <algorithm>
@@ -67,4 +68,3 @@ TEST(TargetSelection, FirstOnesAreTheSameForAnyLimit) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

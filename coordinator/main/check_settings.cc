@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/main/check_settings.h"
 
 #include <filesystem>
@@ -107,4 +108,3 @@ absl::Status CheckSettings(const CoordinatorSettings& settings) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

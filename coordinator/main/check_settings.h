@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/status/status.h>
@@ -10,4 +11,3 @@ namespace meshwright {
 absl::Status CheckSettings(const CoordinatorSettings& settings);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <optional>
@@ -44,4 +45,3 @@ int main(int argc, char** argv) {
   if (settings.blobs.empty()) KeepFilesPrivate();
   return Serve(settings);
 }
-// SPDX-License-Identifier: Apache-2.0

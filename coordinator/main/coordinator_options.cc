@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/main/coordinator_options.h"
 
 #include "program/program_options.h"
@@ -105,4 +106,3 @@ void AddCoordinatorOptions(CLI::App& program, CoordinatorSettings& settings) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -14,4 +15,3 @@ void AddRestOptions(CLI::App& program, CoordinatorSettings& settings);
 void AddAccessOptions(CLI::App& program, CoordinatorSettings& settings);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/main/coordinator_program.h"
 
 #include <algorithm>
@@ -210,4 +211,3 @@ absl::StatusOr<std::unique_ptr<CoordinatorProgram>> CoordinatorProgram::Start(co
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -57,4 +58,3 @@ class CoordinatorProgram {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

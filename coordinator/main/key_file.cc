@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/main/key_file.h"
 
 #include <filesystem>
@@ -14,4 +15,3 @@ absl::Status MakeKeyFile(const std::string& path) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

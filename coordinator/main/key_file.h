@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -10,4 +11,3 @@ namespace meshwright {
 absl::Status MakeKeyFile(const std::string& path);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

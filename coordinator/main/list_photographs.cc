@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/main/list_photographs.h"
 
 #include <filesystem>
@@ -24,4 +25,3 @@ absl::StatusOr<std::vector<PhotographFile>> ListPhotographFiles(const std::strin
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -13,4 +14,3 @@ namespace meshwright {
 absl::StatusOr<std::vector<PhotographFile>> ListPhotographFiles(const std::string& folder);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

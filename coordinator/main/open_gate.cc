@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/main/open_gate.h"
 
 #include <string>
@@ -45,4 +46,3 @@ absl::StatusOr<std::unique_ptr<Gatekeeper>> OpenGate(const CoordinatorSettings& 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -19,4 +20,3 @@ absl::StatusOr<std::unique_ptr<Gatekeeper>> OpenGate(const CoordinatorSettings& 
                                                      const Clock& clock, const Logger& log, Metrics& metrics);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

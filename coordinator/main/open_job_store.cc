@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/main/open_job_store.h"
 
 #include <absl/strings/match.h>
@@ -34,4 +35,3 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where,
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

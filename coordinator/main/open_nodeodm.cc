@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/main/open_nodeodm.h"
 
 #include <utility>
@@ -52,4 +53,3 @@ absl::StatusOr<std::unique_ptr<NodeOdmServer>> OpenNodeOdm(const CoordinatorSett
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

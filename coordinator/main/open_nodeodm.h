@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -22,4 +23,3 @@ absl::StatusOr<std::unique_ptr<NodeOdmServer>> OpenNodeOdm(const CoordinatorSett
                                                            const Clock& clock, const Logger& log);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

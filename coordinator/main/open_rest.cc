@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/main/open_rest.h"
 
 #include <filesystem>
@@ -102,4 +103,3 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

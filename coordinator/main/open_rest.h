@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -23,4 +24,3 @@ absl::StatusOr<std::unique_ptr<RestServer>> OpenRest(const CoordinatorSettings& 
                                                      ThreadPool& pool, const Logger& log);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/form_body.h"
 
 #include <utility>
@@ -86,4 +87,3 @@ std::optional<std::string> FormBody::Field(const std::string& name) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

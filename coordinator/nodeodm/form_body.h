@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -44,4 +45,3 @@ class FormBody {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/multipart.h"
 
 #include <algorithm>
@@ -174,4 +175,3 @@ absl::Status MultipartReader::BeginPart(const std::string& head) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

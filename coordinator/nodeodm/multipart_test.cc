@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/multipart.h"
 
 #include <string>
@@ -102,4 +103,3 @@ TEST(MultipartReaderTest, RefusesWhatIsNoForm) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

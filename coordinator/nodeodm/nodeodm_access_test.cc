@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // NodeODM's protocol asks for the same keys as /v1: its clients show them as ?token=.
 
 #include <memory>
@@ -226,4 +227,3 @@ TEST_F(NodeOdmAccessTest, PagesOfOthersSendNothing) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/nodeodm_server.h"
 
 #include <algorithm>
@@ -586,4 +587,3 @@ absl::StatusOr<std::unique_ptr<NodeOdmServer>> NodeOdmServer::Start(const NodeOd
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/odm_cameras.h"
 
 #include <algorithm>
@@ -111,4 +112,3 @@ Json OdmImages(const Scene& scene) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

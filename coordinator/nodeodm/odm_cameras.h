@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -17,4 +18,3 @@ nlohmann::ordered_json OdmShots(const Scene& scene);
 nlohmann::ordered_json OdmImages(const Scene& scene);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

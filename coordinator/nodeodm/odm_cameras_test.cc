@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/odm_cameras.h"
 
 #include <cmath>
@@ -50,4 +51,3 @@ TEST(OdmCamerasTest, ShotsSayWhereTheCameraIsAndInventNoPlace) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

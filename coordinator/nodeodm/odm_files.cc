@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/odm_files.h"
 
 #include <algorithm>
@@ -50,4 +51,3 @@ std::string OtherName(const std::string& name) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -21,4 +22,3 @@ absl::StatusOr<std::string> BaseName(const std::string& file_name);
 std::string OtherName(const std::string& name);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

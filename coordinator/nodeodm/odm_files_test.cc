@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/odm_files.h"
 
 #include <gtest/gtest.h>
@@ -33,4 +34,3 @@ TEST(OdmFilesTest, NamesStayInTheirFolder) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

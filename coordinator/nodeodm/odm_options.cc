@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/odm_options.h"
 
 #include <algorithm>
@@ -146,4 +147,3 @@ std::string OwnOptionsJson(const OdmTaskOptions& options, int longest_side_px) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

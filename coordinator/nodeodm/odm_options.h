@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -39,4 +40,3 @@ class OdmOptions {
 std::string OwnOptionsJson(const OdmTaskOptions& options, int longest_side_px);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

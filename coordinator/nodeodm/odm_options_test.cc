@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/odm_options.h"
 
 #include <set>
@@ -79,4 +80,3 @@ TEST(OdmOptionsTest, AllBadValuesAreNamed) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/odm_task.h"
 
 #include <cstdint>
@@ -121,4 +122,3 @@ nlohmann::ordered_json DescribeTask(const OdmTask& task, int64_t now_ms) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

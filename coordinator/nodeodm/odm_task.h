@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -56,4 +57,3 @@ absl::StatusOr<OdmTask> DecodeTask(const std::string& text);
 nlohmann::ordered_json DescribeTask(const OdmTask& task, int64_t now_ms);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/result_package.h"
 
 #include <algorithm>
@@ -175,4 +176,3 @@ absl::StatusOr<std::vector<ZipEntry>> ResultPackage::Entries(const std::string& 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

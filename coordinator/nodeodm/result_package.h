@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -40,4 +41,3 @@ class ResultPackage {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/task_board.h"
 
 #include <algorithm>
@@ -562,4 +563,3 @@ void TaskBoard::PackOne(const OdmTask& task) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -135,4 +136,3 @@ class TaskBoard {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

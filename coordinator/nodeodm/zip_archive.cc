@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/zip_archive.h"
 
 #include <algorithm>
@@ -164,4 +165,3 @@ absl::StatusOr<std::string> ZipArchive::Read(int64_t offset, size_t most) const 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

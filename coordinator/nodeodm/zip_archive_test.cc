@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/nodeodm/zip_archive.h"
 
 #include <cstdlib>
@@ -98,4 +99,3 @@ TEST_F(ZipArchiveTest, AFileThatChangedIsSeen) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

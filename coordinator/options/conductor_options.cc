@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/options/conductor_options.h"
 
 #include "common/base/out_of_range.h"
@@ -15,4 +16,3 @@ absl::Status ConductorOptions::Validate() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/camera_json.h"
 
 #include <algorithm>
@@ -179,4 +180,3 @@ absl::StatusOr<Json> LogJson(const ReconstructionService& service, const std::st
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

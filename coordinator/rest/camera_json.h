@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -16,4 +17,3 @@ absl::StatusOr<nlohmann::ordered_json> CamerasJson(const ReconstructionService& 
 absl::StatusOr<nlohmann::ordered_json> LogJson(const ReconstructionService& service, const std::string& id);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <utility>
 
@@ -71,4 +72,3 @@ std::vector<Route> MakeRoutes(const RestContext& context) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/downloads.h"
 
 #include <algorithm>
@@ -119,4 +120,3 @@ absl::StatusOr<std::shared_ptr<const OpenedFile>> DerivedFiles::Get(
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -47,4 +48,3 @@ class DerivedFiles {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/downloads.h"
 
 #include <cstdlib>
@@ -41,4 +42,3 @@ TEST(DerivedFilesTest, MakesEachOnceAndKeepsTheLastOnes) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/event_feeds.h"
 
 #include <algorithm>
@@ -209,4 +210,3 @@ std::optional<std::string> EventFeeds::Stream::Next() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

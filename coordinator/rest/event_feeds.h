@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -86,4 +87,3 @@ class EventFeeds {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

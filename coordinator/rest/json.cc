@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/json.h"
 
 #include <memory>
@@ -85,4 +86,3 @@ absl::Status FromJson(const std::string& json, google::protobuf::Message& messag
 std::string Dump(const nlohmann::ordered_json& json) { return JsonText(json); }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

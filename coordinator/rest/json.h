@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -17,4 +18,3 @@ absl::Status FromJson(const std::string& json, google::protobuf::Message& messag
 std::string Dump(const nlohmann::ordered_json& json);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Holds the OpenAPI file against the routes, both ways: paths, methods and query parameters; and against the messages.
 
 #include <map>
@@ -136,4 +137,3 @@ TEST(OpenApiTest, EachRouteIsReached) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/part_preview.h"
 
 #include <algorithm>
@@ -171,4 +172,3 @@ std::string MakePartPreview(const SparseSurface& surface, int32_t sequence, int6
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

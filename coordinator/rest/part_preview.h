@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -15,4 +16,3 @@ namespace meshwright {
 std::string MakePartPreview(const SparseSurface& surface, int32_t sequence, int64_t max_faces);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

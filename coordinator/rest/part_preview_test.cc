@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/part_preview.h"
 
 #include <cmath>
@@ -143,4 +144,3 @@ TEST(PartPreviewTest, OfNothingIsAHeader) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

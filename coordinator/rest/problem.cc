@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/problem.h"
 
 #include <algorithm>
@@ -162,4 +163,3 @@ absl::Status StatusOfFault(const HttpFault& fault) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

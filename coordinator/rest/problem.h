@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -26,4 +27,3 @@ std::string ProblemJson(const absl::Status& status);
 absl::Status StatusOfFault(const HttpFault& fault);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

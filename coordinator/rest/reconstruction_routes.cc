@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <functional>
 #include <memory>
 #include <string>
@@ -175,4 +176,3 @@ void AddReconstructionRoutes(const RestContext& context, std::vector<Route>& rou
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/rest_server.h"
 
 #include <algorithm>
@@ -191,4 +192,3 @@ absl::StatusOr<std::unique_ptr<RestServer>> RestServer::Start(const RestOptions&
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

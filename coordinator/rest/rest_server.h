@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -74,4 +75,3 @@ class RestServer {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <functional>
 #include <limits>
@@ -234,4 +235,3 @@ void AddResultRoutes(const RestContext& context, std::vector<Route>& routes) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/router.h"
 
 #include <algorithm>
@@ -168,4 +169,3 @@ void AnswerStatus(const absl::Status& status, HttpResponse& response) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

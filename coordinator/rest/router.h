@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -67,4 +68,3 @@ absl::Status TakeBody(RestCall& call, int64_t most, std::function<absl::Status(a
 void AnswerStatus(const absl::Status& status, HttpResponse& response);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

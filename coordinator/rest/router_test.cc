@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/router.h"
 
 #include <gmock/gmock.h>
@@ -93,4 +94,3 @@ TEST(ProblemTest, IsTextWhateverCameFromOutside) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

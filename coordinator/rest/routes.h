@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -46,4 +47,3 @@ std::vector<Route> MakeRoutes(const RestContext& context);
 constexpr char kJsonType[] = "application/json";
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <limits>
 #include <utility>
 
@@ -112,4 +113,3 @@ void AddSceneRoutes(const RestContext& context, std::vector<Route>& routes) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

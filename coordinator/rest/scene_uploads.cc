@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/scene_uploads.h"
 
 #include <algorithm>
@@ -380,4 +381,3 @@ void SceneUploads::RemoveFolder(const std::string& id) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -118,4 +119,3 @@ class SceneUploads {
 std::optional<int64_t> ExpectedOffsetOf(const absl::Status& status);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

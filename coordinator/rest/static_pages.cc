@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/rest/static_pages.h"
 
 #include <array>
@@ -107,4 +108,3 @@ absl::Status SendPage(RestCall& call, const std::string& folder) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

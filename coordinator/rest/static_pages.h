@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -12,4 +13,3 @@ namespace meshwright {
 absl::Status SendPage(RestCall& call, const std::string& folder);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

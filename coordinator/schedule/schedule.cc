@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/schedule/schedule.h"
 
 #include <absl/strings/str_cat.h>
@@ -123,4 +124,3 @@ void Schedule::Choose() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

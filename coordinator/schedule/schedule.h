@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -112,4 +113,3 @@ class Schedule {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

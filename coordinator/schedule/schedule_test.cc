@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/schedule/schedule.h"
 
 #include <algorithm>
@@ -264,4 +265,3 @@ TEST(Schedule, TenThousandCamerasAreQuick) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

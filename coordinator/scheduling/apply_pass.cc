@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/scheduling/apply_pass.h"
 
 #include <utility>
@@ -66,4 +67,3 @@ absl::StatusOr<CameraJobSpec> SpecOf(const CameraJob& job) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

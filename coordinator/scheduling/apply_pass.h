@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <set>
@@ -37,4 +38,3 @@ SchedulingPass::MemorySteps MemoryStepsOf(JobStore& store);
 absl::StatusOr<CameraJobSpec> SpecOf(const CameraJob& job);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/status/status.h>
@@ -13,4 +14,3 @@ struct LeaseOptions {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/scheduling/lease_watch.h"
 
 #include <algorithm>
@@ -33,4 +34,3 @@ bool LeaseWatch::TakesTooLong(const OpenJob& job, absl::Duration limit) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

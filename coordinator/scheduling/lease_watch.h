@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <map>
@@ -37,4 +38,3 @@ class LeaseWatch {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/scheduling/lease_watch.h"
 
 #include <gtest/gtest.h>
@@ -66,4 +67,3 @@ TEST(LeaseWatchTest, AJobTakesTooLongHoweverOftenItsLeaseIsRenewed) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

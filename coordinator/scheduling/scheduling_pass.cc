@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/scheduling/scheduling_pass.h"
 
 #include <algorithm>
@@ -282,4 +283,3 @@ int SchedulingPass::LeasesIn(const std::string& reconstruction) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -94,4 +95,3 @@ class SchedulingPass {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

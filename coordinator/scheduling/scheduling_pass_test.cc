@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/scheduling/scheduling_pass.h"
 
 #include <deque>
@@ -351,4 +352,3 @@ TEST(SchedulingPassTest, WhatIsGivenBackCountsForNothing) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

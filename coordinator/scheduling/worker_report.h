@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -59,4 +60,3 @@ struct WorkerReport {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/job_store.h"
 
 #include <absl/strings/numbers.h>
@@ -60,4 +61,3 @@ bool IsFinal(ReconstructionState state) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -388,4 +389,3 @@ std::string PrintableText(const std::string& text);
 bool IsFinal(ReconstructionState state);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

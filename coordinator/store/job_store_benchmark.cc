@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How many camera jobs a second the stores hand out, with as many callers as threads.
 #include <cstdlib>
 #include <filesystem>
@@ -122,4 +123,3 @@ BENCHMARK(WholeLife)->ArgName("postgres")->Arg(0)->Arg(1)->UseRealTime();
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -918,4 +919,3 @@ TEST_P(JobStoreConformance, AMeshEndsAReconstruction) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

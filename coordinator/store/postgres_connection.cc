@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/postgres_connection.h"
 
 #include <algorithm>
@@ -254,4 +255,3 @@ PostgresError PostgresConnection::Migrate(absl::Duration deadline) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <map>
@@ -75,4 +76,3 @@ class PostgresConnection {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

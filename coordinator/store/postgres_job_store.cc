@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/postgres_job_store.h"
 
 #include <algorithm>
@@ -198,4 +199,3 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenPostgresJobStore(const std::string
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

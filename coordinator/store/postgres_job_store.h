@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -26,4 +27,3 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenPostgresJobStore(const std::string
                                                                const WrapSqlDatabase& wrap = nullptr);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

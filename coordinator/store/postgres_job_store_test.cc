@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/postgres_job_store.h"
 
 #include <atomic>
@@ -202,4 +203,3 @@ TEST(PostgresRestartTest, CallsOutliveARestart) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/postgres_testing.h"
 
 #include <array>
@@ -94,4 +95,3 @@ std::string RunSql(const std::string& url, const std::string& sql) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -49,4 +50,3 @@ class PostgresSchema {
 std::string RunSql(const std::string& url, const std::string& sql);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

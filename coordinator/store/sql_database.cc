@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/sql_database.h"
 
 #include <absl/strings/numbers.h>
@@ -33,4 +34,3 @@ std::map<std::string, std::string> ParseSqlStatements(const std::vector<std::pai
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -68,4 +69,3 @@ std::map<std::string, std::string> ParseSqlStatements(const std::vector<std::pai
 const std::vector<std::pair<std::string, std::string>>& CommonStatements();
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/sql_job_store.h"
 
 #include <cmath>
@@ -375,4 +376,3 @@ absl::StatusOr<std::vector<Commit>> SqlJobStore::ListCommits(const std::string& 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -87,4 +88,3 @@ std::string CameraJobName(const std::string& id, SequenceNumber sequence);
 absl::StatusOr<ReconstructionState> ReadReconstructionState(const std::string& text);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who may what: keys, owners and what they have.
 #include <absl/strings/str_cat.h>
 
@@ -67,4 +68,3 @@ absl::Status SqlJobStore::RemoveDeadTokens(absl::Time before) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

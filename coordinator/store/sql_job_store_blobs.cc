@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which blobs belong to whom: scenes' files, held blobs, damaged ones.
 #include "common/base/status_macros.h"
 #include "coordinator/store/sql_job_store.h"
@@ -60,4 +61,3 @@ absl::Status SqlJobStore::ForgetDamagedBlob(const std::string& id, const std::st
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who holds what: leases of camera jobs, conductors of reconstructions, workers.
 #include <absl/strings/str_cat.h>
 
@@ -269,4 +270,3 @@ absl::Status SqlJobStore::RemoveSilentWorkers(absl::Time before) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

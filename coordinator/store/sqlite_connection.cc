@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/sqlite_connection.h"
 
 #include <utility>
@@ -194,4 +195,3 @@ absl::Status SqliteConnection::Migrate() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

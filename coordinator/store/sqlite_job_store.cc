@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/sqlite_job_store.h"
 
 #include <utility>
@@ -95,4 +96,3 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenSqliteJobStore(const std::string& 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

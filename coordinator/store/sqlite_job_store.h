@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -17,4 +18,3 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenSqliteJobStore(const std::string& 
                                                              const WrapSqlDatabase& wrap = nullptr);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/store/sqlite_job_store.h"
 
 #include <cstdlib>
@@ -81,4 +82,3 @@ TEST(SqliteJobStoreTest, AStoreOfTheFirstVersionIsBroughtUpToDateWithWhatIsInIt)
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/telemetry/cluster_gauges.h"
 
 #include <algorithm>
@@ -96,4 +97,3 @@ void AddClusterGauges(Metrics& metrics, SqlDatabase& database, const WorkerServi
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -16,4 +17,3 @@ void AddClusterGauges(Metrics& metrics, SqlDatabase& database, const WorkerServi
                       const std::string& data_folder);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

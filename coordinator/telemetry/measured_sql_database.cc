@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/telemetry/measured_sql_database.h"
 
 #include <algorithm>
@@ -143,4 +144,3 @@ void MeasuredSqlDatabase::CountChanges(const std::string& statement, const SqlPa
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -38,4 +39,3 @@ class MeasuredSqlDatabase final : public SqlDatabase {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

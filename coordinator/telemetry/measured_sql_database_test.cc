@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/telemetry/measured_sql_database.h"
 
 #include <filesystem>
@@ -256,4 +257,3 @@ TEST(MeasuredSqlDatabaseTest, ErrorsAreCountedAndChangeNothingElse) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

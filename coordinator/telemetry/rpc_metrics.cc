@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/telemetry/rpc_metrics.h"
 
 #include <string>
@@ -51,4 +52,3 @@ std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeRpcMe
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -14,4 +15,3 @@ namespace meshwright {
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeRpcMetrics(Metrics& metrics);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

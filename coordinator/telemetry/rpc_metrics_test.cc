@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/telemetry/rpc_metrics.h"
 
 #include <memory>
@@ -58,4 +59,3 @@ TEST(RpcMetricsTest, CallsAreTimedByMethodAndErrorsByCode) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

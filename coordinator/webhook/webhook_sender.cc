@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/webhook/webhook_sender.h"
 
 #include <memory>
@@ -127,4 +128,3 @@ absl::Status WebhookSender::SendOnce(const std::string& body) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

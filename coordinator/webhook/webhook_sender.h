@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <deque>
@@ -50,4 +51,3 @@ class WebhookSender {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

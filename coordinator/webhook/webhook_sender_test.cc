@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "coordinator/webhook/webhook_sender.h"
 
 #include <atomic>
@@ -132,4 +133,3 @@ TEST(WebhookSenderTest, OnlyAddressesOfTheWebAreTaken) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

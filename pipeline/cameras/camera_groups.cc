@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/camera_groups.h"
 
 #include <algorithm>
@@ -52,4 +53,3 @@ std::vector<CameraGroup> GroupByCamera(const std::vector<Photograph>& photograph
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

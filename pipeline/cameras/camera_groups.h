@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -22,4 +23,3 @@ struct CameraGroup {
 std::vector<CameraGroup> GroupByCamera(const std::vector<Photograph>& photographs);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

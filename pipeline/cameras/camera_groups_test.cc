@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/camera_groups.h"
 
 #include <gmock/gmock.h>
@@ -43,4 +44,3 @@ TEST(CameraGroups, FewPhotographsDoNotDetermineManyCoefficients) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/child_process.h"
 
 #include <array>
@@ -150,4 +151,3 @@ absl::StatusOr<ChildExit> RunChild(const std::vector<std::string>& arguments,
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -26,4 +27,3 @@ absl::StatusOr<ChildExit> RunChild(const std::vector<std::string>& arguments,
                                    const std::function<bool()>& stop);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/child_process.h"
 
 #include <csignal>
@@ -102,4 +103,3 @@ TEST(ChildProcess, DiesWithItsParentWhateverKillsIt) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/colmap_database.h"
 
 #include <algorithm>
@@ -254,4 +255,3 @@ absl::StatusOr<std::string> ColmapDatabase::StartVerification() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -88,4 +89,3 @@ class ColmapDatabase {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

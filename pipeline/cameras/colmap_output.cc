@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/colmap_output.h"
 
 #include <algorithm>
@@ -69,4 +70,3 @@ bool ColmapOutput::Read(const std::string& line) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

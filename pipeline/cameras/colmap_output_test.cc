@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/colmap_output.h"
 
 #include <gtest/gtest.h>
@@ -47,4 +48,3 @@ TEST(ColmapOutput, KeepsTheLastTrouble) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

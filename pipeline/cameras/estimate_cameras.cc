@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/estimate_cameras.h"
 
 #include <algorithm>
@@ -549,4 +550,3 @@ absl::StatusOr<CameraEstimate> EstimateCameras(const CameraEstimationSettings& s
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

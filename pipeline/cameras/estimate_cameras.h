@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -58,4 +59,3 @@ absl::StatusOr<CameraEstimate> EstimateCameras(const CameraEstimationSettings& s
                                                const CameraProgressListener& listener);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
@@ -46,4 +47,3 @@ TEST(EstimateCamerasWithColmap, ThreadsHaveNoInfluence) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

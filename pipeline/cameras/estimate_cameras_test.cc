@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/estimate_cameras.h"
 
 #include <algorithm>
@@ -221,4 +222,3 @@ TEST_F(EstimateCamerasTest, MissingOrStrangeColmapIsOneLine) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/exif.h"
 
 #include <bit>
@@ -128,4 +129,3 @@ ExifCamera ReadExifCamera(const std::string& jpeg_beginning) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

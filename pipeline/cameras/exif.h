@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -20,4 +21,3 @@ struct ExifCamera {
 ExifCamera ReadExifCamera(const std::string& jpeg_beginning);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

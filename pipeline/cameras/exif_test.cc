@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/exif.h"
 
 #include <cstdint>
@@ -85,4 +86,3 @@ TEST(Exif, OtherFilesHaveNone) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

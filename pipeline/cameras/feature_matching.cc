@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/feature_matching.h"
 
 #include <algorithm>
@@ -153,4 +154,3 @@ absl::StatusOr<std::vector<ImagePair>> FindSimilarPairs(ColmapDatabase& database
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

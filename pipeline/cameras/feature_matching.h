@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -34,4 +35,3 @@ absl::StatusOr<std::vector<ImagePair>> FindSimilarPairs(ColmapDatabase& database
                                                         ThreadPool& pool, const MatchingProgress& progress);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

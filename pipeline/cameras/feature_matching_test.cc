@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/feature_matching.h"
 
 #include <cmath>
@@ -133,4 +134,3 @@ TEST_F(FeatureMatchingTest, DescriptorsOfAnotherKindAreRefused) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

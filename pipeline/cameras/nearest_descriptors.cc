@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/nearest_descriptors.h"
 
 #include <algorithm>
@@ -138,4 +139,3 @@ void FindNearest(const PackedDescriptors& a, const PackedDescriptors& b, Nearest
 
 }  // namespace meshwright
 #endif
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -41,4 +42,3 @@ void FindNearest(const PackedDescriptors& a, const PackedDescriptors& b, Nearest
                  NearestDescriptors* of_b);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

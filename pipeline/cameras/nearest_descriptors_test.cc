@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/nearest_descriptors.h"
 
 #include <random>
@@ -66,4 +67,3 @@ TEST(NearestDescriptors, OfNothingThereIsNone) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

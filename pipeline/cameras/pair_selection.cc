@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/pair_selection.h"
 
 #include <algorithm>
@@ -105,4 +106,3 @@ size_t SimilarPerPhotograph(PairSelection selection) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -37,4 +38,3 @@ std::vector<ImagePair> PairsByNumber(PairSelection selection, int64_t images);
 size_t SimilarPerPhotograph(PairSelection selection);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

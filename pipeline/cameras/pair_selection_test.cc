@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/pair_selection.h"
 
 #include <absl/strings/str_format.h>
@@ -47,4 +48,3 @@ TEST(PairSelection, NamesComeBack) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/photograph_folder.h"
 
 #include <algorithm>
@@ -272,4 +273,3 @@ bool HoldsPhotographs(const std::string& path) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -44,4 +45,3 @@ absl::Status CheckPhotographs(PhotographFolder* folder, ThreadPool& pool, const 
 bool HoldsPhotographs(const std::string& path);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

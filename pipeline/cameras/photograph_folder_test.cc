@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/photograph_folder.h"
 
 #include <gmock/gmock.h>
@@ -99,4 +100,3 @@ TEST(PhotographFolder, HoldsPhotographsLooksForThem) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

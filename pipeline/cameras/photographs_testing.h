@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -21,4 +22,3 @@ inline ColorImage TestPicture(int width, int height) {
 inline std::string TestJpeg(int width = 64, int height = 48) { return EncodeJpeg(TestPicture(width, height), 90); }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

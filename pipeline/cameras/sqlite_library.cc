@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/cameras/sqlite_library.h"
 
 #include <absl/strings/str_cat.h>
@@ -62,4 +63,3 @@ const SqliteFunctions& Sqlite() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/status/status.h>
@@ -31,4 +32,3 @@ absl::Status LoadSqlite();
 const SqliteFunctions& Sqlite();
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

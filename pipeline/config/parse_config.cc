@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/config/parse_config.h"
 
 #include "pipeline/options/options_json.h"
@@ -24,4 +25,3 @@ absl::StatusOr<ReconstructionConfig> ParseConfig(const std::string& options_json
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/inspection/inspection.h"
 
 #include <algorithm>
@@ -160,4 +161,3 @@ std::string ToText(const Inspection& inspection) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -54,4 +55,3 @@ nlohmann::ordered_json ToJson(const Inspection& inspection);
 std::string ToText(const Inspection& inspection);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/library/library.h"
 
 #include <algorithm>
@@ -54,4 +55,3 @@ absl::StatusOr<ReconstructionSummary> Reconstruct(const Scene& scene, const Reco
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -37,4 +38,3 @@ absl::StatusOr<ReconstructionSummary> Reconstruct(const Scene& scene, const Reco
                                                   const ProgressListener& progress = nullptr);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

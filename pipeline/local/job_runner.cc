@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/local/job_runner.h"
 
 #include <chrono>
@@ -160,4 +161,3 @@ absl::Status JobRunner::Enqueue(const SchedulingPass& pass, AppliedPass applied)
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -22,4 +23,3 @@ struct LocalProgress {
 using ProgressListener = std::function<void(const LocalProgress&)>;  // one call at a time, from any thread
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/local/local_reconstruction.h"
 
 #include <algorithm>
@@ -439,4 +440,3 @@ absl::StatusOr<Json> ReconstructLocally(const Scene& scene, const Reconstruction
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -52,4 +53,3 @@ absl::StatusOr<nlohmann::ordered_json> ReconstructLocally(const Scene& scene, co
 int ConcurrentJobs(const ReconstructionOptions& options, int threads);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/local/local_reconstruction.h"
 
 #include <algorithm>
@@ -275,4 +276,3 @@ TEST_F(LocalReconstructionTest, AChangedPhotographIsAnotherScene) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every option at its bounds, and all of them together, through the whole method: there may be nothing to see, but
 // nothing overflows, and no process dies.
 
@@ -91,4 +92,3 @@ TEST_F(OptionBoundsTest, AnImageOfOnePixel) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

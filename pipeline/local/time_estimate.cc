@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/local/time_estimate.h"
 
 #include <algorithm>
@@ -178,4 +179,3 @@ std::string ToText(const TimeEstimate& estimate) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

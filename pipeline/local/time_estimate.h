@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -35,4 +36,3 @@ nlohmann::ordered_json ToJson(const TimeEstimate& estimate);
 std::string ToText(const TimeEstimate& estimate);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/local/time_estimate.h"
 
 #include <cstdlib>
@@ -71,4 +72,3 @@ TEST_F(TimeEstimateTest, AScenesFaultsAreBadInput) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/local/verdict.h"
 
 #include <algorithm>
@@ -124,4 +125,3 @@ std::string DescribeWarning(const Json& verdict) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

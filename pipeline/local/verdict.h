@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -30,4 +31,3 @@ std::string DescribeVerdict(const nlohmann::ordered_json& verdict);
 std::string DescribeWarning(const nlohmann::ordered_json& verdict);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/local/verdict.h"
 
 #include <gmock/gmock.h>
@@ -83,4 +84,3 @@ TEST(Verdict, NothingProcessedIsNoDivisionByZero) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

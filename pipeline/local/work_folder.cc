@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/local/work_folder.h"
 
 #include <cerrno>
@@ -132,4 +133,3 @@ absl::Status WorkFolder::Remove() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

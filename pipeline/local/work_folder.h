@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -53,4 +54,3 @@ class WorkFolder {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/local/work_folder.h"
 
 #include <cstdlib>
@@ -130,4 +131,3 @@ TEST_F(WorkFolderTest, AMissingParentIsNamed) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

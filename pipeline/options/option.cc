@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 
@@ -125,4 +126,3 @@ absl::Status CheckOptions(const ReconstructionOptions& options, const std::strin
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/options/option_table.h"
 
 namespace meshwright {
@@ -132,4 +133,3 @@ const std::vector<OptionRelation>& OptionRelations() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

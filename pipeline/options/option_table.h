@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -66,4 +67,3 @@ absl::StatusOr<OptionValue> CheckOptionValue(const Option& option, OptionValue v
 absl::Status CheckOptions(const ReconstructionOptions& options, const std::string& prefix);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

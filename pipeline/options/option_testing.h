@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -70,4 +71,3 @@ inline bool IsJsonNumber(const std::string& text) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

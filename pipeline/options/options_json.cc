@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/options/options_json.h"
 
 #include <cstdint>
@@ -142,4 +143,3 @@ std::string DescribeOptionsForRest() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -30,4 +31,3 @@ std::string DescribeMethods(int64_t before, int64_t now);
 std::string DescribeOptionsForRest();
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

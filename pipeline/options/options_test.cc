@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <limits>
 #include <set>
@@ -169,4 +170,3 @@ TEST(DescribeOptionsForRestTest, ItSaysWhatIsDeclared) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/options/presets.h"
 
 #include <algorithm>
@@ -54,4 +55,3 @@ std::string DescribeValues(const Preset& preset) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -33,4 +34,3 @@ absl::Status ApplyPreset(const std::string& name, const std::string& prefix, Rec
 std::string DescribeValues(const Preset& preset);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

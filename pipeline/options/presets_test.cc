@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/options/presets.h"
 
 #include <set>
@@ -93,4 +94,3 @@ TEST(PresetsTest, RestNamesThem) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/options/reconstruction_options.h"
 
 #include "pipeline/options/option_table.h"
@@ -15,4 +16,3 @@ absl::Status ReconstructionOptions::Validate() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/status/status.h>
@@ -21,4 +22,3 @@ struct ReconstructionOptions {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

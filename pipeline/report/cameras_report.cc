@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/report/cameras_report.h"
 
 #include <vector>
@@ -90,4 +91,3 @@ absl::StatusOr<Json> MakeCamerasReport(const Scene& scene, JobStore& store, cons
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

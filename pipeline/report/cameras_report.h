@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -30,4 +31,3 @@ absl::StatusOr<nlohmann::ordered_json> MakeCamerasReport(const Scene& scene, Job
                                                          const std::string& reconstruction_id, ReportTotals* totals);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/report/mesh_pictures.h"
 
 #include <algorithm>
@@ -115,4 +116,3 @@ void FadeUnseen(const SeenCells& cells, ColorImage& photograph) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

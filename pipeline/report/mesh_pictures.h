@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -38,4 +39,3 @@ SeenCells FindSeenCells(const MeshSample& sample, const Camera& camera);
 void FadeUnseen(const SeenCells& cells, ColorImage& photograph);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

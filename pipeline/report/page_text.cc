@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/report/page_text.h"
 
 #include <algorithm>
@@ -95,4 +96,3 @@ std::string Bar(const RayShares& shares, const std::string& more_classes) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

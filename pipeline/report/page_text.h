@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -32,4 +33,3 @@ RayShares SharesOf(double covered_before, double grown, double accepted);
 std::string Bar(const RayShares& shares, const std::string& more_classes);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

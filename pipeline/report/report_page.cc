@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/report/report_page.h"
 
 #include <algorithm>
@@ -310,4 +311,3 @@ absl::StatusOr<std::string> MakeReportPage(const ReportPageInput& input, ThreadP
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -27,4 +28,3 @@ constexpr size_t kMostPhotographs = 600;
 absl::StatusOr<std::string> MakeReportPage(const ReportPageInput& input, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

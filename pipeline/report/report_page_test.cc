@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/report/report_page.h"
 
 #include <array>
@@ -180,4 +181,3 @@ TEST(DrawMeshTest, WhatIsNearestIsSeenWhateverComesFirst) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

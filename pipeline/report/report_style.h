@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 namespace meshwright {
@@ -45,4 +46,3 @@ summary { cursor: pointer; font-weight: 600; }
 )css";
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/atlas_packing.h"
 
 #include <algorithm>
@@ -126,4 +127,3 @@ AtlasLayout PackCharts(const std::vector<Chart>& charts, int max_size) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

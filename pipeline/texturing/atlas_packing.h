@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -35,4 +36,3 @@ constexpr int kChartPadding = 4;  // px around a chart that are its own
 AtlasLayout PackCharts(const std::vector<Chart>& charts, int max_size);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/atlas_packing.h"
 
 #include <algorithm>
@@ -58,4 +59,3 @@ TEST(AtlasPackingTest, WhatFitsIntoOnePageIsOnOneThatIsHardlyLarger) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/atlas_page.h"
 
 #include <algorithm>
@@ -113,4 +114,3 @@ ColorImage AtlasPage::Finish() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -28,4 +29,3 @@ class AtlasPage {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

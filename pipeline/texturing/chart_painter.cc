@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/chart_painter.h"
 
 #include <algorithm>
@@ -228,4 +229,3 @@ PaintedChart PaintUnseenFace(const PixelBox& box, const std::array<Eigen::Vector
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

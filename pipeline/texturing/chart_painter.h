@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -34,4 +35,3 @@ PaintedChart PaintUnseenFace(const PixelBox& box, const std::array<Eigen::Vector
 std::array<Eigen::Vector2d, 3> UnseenCorners(const PixelBox& box);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

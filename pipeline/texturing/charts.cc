@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/charts.h"
 
 #include <algorithm>
@@ -139,4 +140,3 @@ std::vector<Chart> MakeCharts(const TriangleMesh& mesh, const std::vector<InnerE
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

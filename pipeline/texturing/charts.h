@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -29,4 +30,3 @@ std::vector<Chart> MakeCharts(const TriangleMesh& mesh, const std::vector<InnerE
                               const std::vector<int32_t>& labels, const std::vector<Camera>& cameras);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

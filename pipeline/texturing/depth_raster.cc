@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/depth_raster.h"
 
 #include <algorithm>
@@ -84,4 +85,3 @@ void DepthRaster::Spread(ThreadPool& pool) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

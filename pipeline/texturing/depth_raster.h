@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -56,4 +57,3 @@ class DepthRaster {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/face_graph.h"
 
 #include <algorithm>
@@ -35,4 +36,3 @@ std::vector<InnerEdge> FindInnerEdges(const TriangleMesh& mesh) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -18,4 +19,3 @@ struct InnerEdge {
 std::vector<InnerEdge> FindInnerEdges(const TriangleMesh& mesh);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/face_views.h"
 
 #include <algorithm>
@@ -215,4 +216,3 @@ void FaceViews::RemoveOutliers(ThreadPool& pool) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -55,4 +56,3 @@ class FaceViews {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

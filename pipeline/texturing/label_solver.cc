@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/label_solver.h"
 
 #include <algorithm>
@@ -214,4 +215,3 @@ LabelSolution SolveLabels(const LabelProblem& problem, int max_iterations) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -31,4 +32,3 @@ struct LabelSolution {
 LabelSolution SolveLabels(const LabelProblem& problem, int max_iterations);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

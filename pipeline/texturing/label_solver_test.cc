@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/label_solver.h"
 
 #include <limits>
@@ -91,4 +92,3 @@ TEST(LabelSolverTest, NodesWithoutCandidatesHaveNoLabel) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

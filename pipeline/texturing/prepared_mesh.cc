@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/prepared_mesh.h"
 
 #include <algorithm>
@@ -154,4 +155,3 @@ TriangleMesh PrepareMesh(TriangleMesh mesh, double max_error, double max_edge) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -16,4 +17,3 @@ double MedianFootprint(const TriangleMesh& mesh, const std::vector<Camera>& came
 TriangleMesh PrepareMesh(TriangleMesh mesh, double max_error, double max_edge);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

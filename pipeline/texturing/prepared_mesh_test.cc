@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/prepared_mesh.h"
 
 #include <Eigen/Geometry>
@@ -65,4 +66,3 @@ TEST(PreparedMeshTest, FootprintIsDepthByFocalLengthOfTheNearestCamera) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/seam_leveling.h"
 
 #include <algorithm>
@@ -160,4 +161,3 @@ SeamJumps MeasureJumps(const Seams& seams, const VertexOffsets& offsets) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

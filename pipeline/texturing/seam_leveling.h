@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -49,4 +50,3 @@ SeamJumps MeasureJumps(const Seams& seams, const VertexOffsets& offsets);
 Eigen::Vector3f HalfGap(const Seams& seams, const Seam& seam, int sample, const VertexOffsets& offsets);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/seams.h"
 
 #include <algorithm>
@@ -84,4 +85,3 @@ void Seams::Sample(const TriangleMesh& mesh, int32_t label, const Camera& camera
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

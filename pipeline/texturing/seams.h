@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -53,4 +54,3 @@ class Seams {
 Eigen::Vector3f SampleColor(const ColorImage& image, const Eigen::Vector2d& pixel);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/texture_mesh.h"
 
 #include <algorithm>
@@ -298,4 +299,3 @@ absl::StatusOr<TextureReport> WriteTexturedMesh(TriangleMesh mesh, const Scene& 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -44,4 +45,3 @@ absl::StatusOr<TextureReport> WriteTexturedMesh(
     TriangleMesh* prepared = nullptr);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

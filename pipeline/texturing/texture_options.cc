@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/texturing/texture_options.h"
 
 #include <absl/strings/str_cat.h>
@@ -24,4 +25,3 @@ absl::Status TextureOptions::Validate() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/status/status.h>
@@ -19,4 +20,3 @@ struct TextureOptions {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -70,4 +71,3 @@ class ImageTriangle {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

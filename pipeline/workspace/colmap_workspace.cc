@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <filesystem>
 #include <utility>
@@ -95,4 +96,3 @@ absl::Status WriteColmapWorkspace(const Scene& scene, TriangleMesh mesh, const W
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

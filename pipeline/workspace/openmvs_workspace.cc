@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -94,4 +95,3 @@ absl::Status WriteOpenMvsWorkspace(const Scene& scene, TriangleMesh mesh, const 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/workspace/undistorted_scene.h"
 
 #include <filesystem>
@@ -60,4 +61,3 @@ absl::StatusOr<Scene> WriteUndistortedScene(
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -20,4 +21,3 @@ absl::StatusOr<Scene> WriteUndistortedScene(
     const std::function<absl::Status(const View& view, const std::string& name)>& use);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -34,4 +35,3 @@ absl::Status WriteOpenMvsWorkspace(const Scene& scene, TriangleMesh mesh, const 
                                    ThreadPool& pool, const WorkspaceProgress& progress);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A coordinator and its workers in one process, on a free port, over real connections.
 
 #include <cstdlib>
@@ -340,4 +341,3 @@ TEST_F(ClusterTest, BadRequestsNameTheField) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

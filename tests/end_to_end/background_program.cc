@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/end_to_end/background_program.h"
 
 #include <csignal>
@@ -56,4 +57,3 @@ std::string ListeningPort(const std::string& log, const std::string& said) {
 }
 
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

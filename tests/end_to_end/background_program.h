@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <chrono>
@@ -43,4 +44,3 @@ bool WaitUntil(const Condition& condition, double seconds) {
 std::string ListeningPort(const std::string& log, const std::string& said = "listening on port ");
 
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

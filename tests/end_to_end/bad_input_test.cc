@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whatever is wrong with the input or the machine: one line that names the file, the right exit code, no crash, and no
 // half-written output.
 
@@ -213,4 +214,3 @@ TEST(BadMeshTest, EvaluateNamesTheFile) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

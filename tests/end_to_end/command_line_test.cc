@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What scripts and people rely on: help, exit codes, where things are printed.
 
 #include <string>
@@ -146,4 +147,3 @@ TEST(CommandLineTest, RenderMakesAPicture) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

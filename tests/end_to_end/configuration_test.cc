@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Settings of the real programs: none is passed over in silence, and --check says whether they are good.
 
 #include <array>
@@ -111,4 +112,3 @@ TEST(ConfigurationTest, EveryProgramKnowsTheNamesOfTheOthers) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

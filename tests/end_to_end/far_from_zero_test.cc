@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scenes in coordinates far from zero, as surveyors have them: the mesh is that of the scene near zero, moved.
 
 #include <algorithm>
@@ -245,4 +246,3 @@ TEST(FarFromZeroServiceTest, TheServiceGivesTheSameBytes) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Photographs alone through the service: a worker with COLMAP takes the stage that estimates their cameras, under a
 // lease as any job. COLMAP is pipeline/cameras/fake_colmap, whose mapper finds the true cameras.
 
@@ -168,4 +169,3 @@ TEST_F(PhotographsTest, PhotographsThatGiveNoCamerasFailOnceWithAdvice) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/end_to_end/program.h"
 
 #include <algorithm>
@@ -121,4 +122,3 @@ const std::string& SharedScene(const std::string& name) {
 }
 
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

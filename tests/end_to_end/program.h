@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -43,4 +44,3 @@ std::vector<std::string> ListFolder(const std::string& path);
 const std::string& SharedScene(const std::string& name);
 
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The whole program on synthetic scenes: is the mesh right, and is it always the same?
 
 #include <algorithm>
@@ -220,4 +221,3 @@ TEST(ReconstructTest, AFolderOfSomebodyElseIsNotWorkedIn) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Masks and regions: what is hidden or outside is not in the mesh, and costs nothing.
 
 #include <filesystem>
@@ -128,4 +129,3 @@ TEST(CropTest, SaysWhatIsWrong) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/end_to_end/running_service.h"
 
 #include <algorithm>
@@ -64,4 +65,3 @@ std::string RunningService::LocalMesh(const std::string& scene, const std::vecto
 }
 
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -46,4 +47,3 @@ class RunningService {
 };
 
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The service as real processes: a coordinator, two workers and the command line's client. What they make has the bytes
 // that one process makes. What may go wrong meanwhile is in tests/faults.
 
@@ -155,4 +156,3 @@ TEST(ServiceTest, ACoordinatorThatIsNotThereIsAFailureInOneLine) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

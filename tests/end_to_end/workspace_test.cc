@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is written for other programs, with the real ones where they are installed.
 
 #include <cstdlib>
@@ -65,4 +66,3 @@ TEST(WorkspaceTest, OpenMvsSceneHasTheSameCameras) {
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Clocks that are set an hour forward or back while a reconstruction runs: of the coordinator, of a worker, of the
 // database. Each of these ends with the bytes that one undisturbed process makes, and hardly later.
 
@@ -118,4 +119,3 @@ TEST_F(ClockFaultsTest, TheDatabasesIsSet) {
 
 }  // namespace
 }  // namespace meshwright::faults
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/faults/cut_line.h"
 
 #include <algorithm>
@@ -116,4 +117,3 @@ void CutLine::CloseAll() {
 }
 
 }  // namespace meshwright::faults
-// SPDX-License-Identifier: Apache-2.0

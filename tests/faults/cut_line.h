@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -42,4 +43,3 @@ class CutLine {
 };
 
 }  // namespace meshwright::faults
-// SPDX-License-Identifier: Apache-2.0

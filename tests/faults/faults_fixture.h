@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdlib>
@@ -60,4 +61,3 @@ class Environment {
 };
 
 }  // namespace meshwright::faults
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What may go wrong while a reconstruction runs. Each of these ends with the bytes that one undisturbed process makes.
 
 #include <csignal>
@@ -213,4 +214,3 @@ TEST_F(FaultsTest, AWorkersDiskIsFullForAWhile) {
 
 }  // namespace
 }  // namespace meshwright::faults
-// SPDX-License-Identifier: Apache-2.0

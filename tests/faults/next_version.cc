@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Programs of the version after this one, for upgrades in tests: linked in place of common/base/version.cc and
 // method_version.cc.
 
@@ -14,4 +15,3 @@ const char* const kProgramVersion = "99.0.0";
 const int kMethodVersion = std::atoi(std::getenv("NEXT_METHOD_VERSION"));
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

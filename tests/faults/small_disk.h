@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -39,4 +40,3 @@ class SmallDisk {
 };
 
 }  // namespace meshwright::faults
-// SPDX-License-Identifier: Apache-2.0

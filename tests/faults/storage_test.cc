@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Folders that go, are full, or that two want: what was promised stays true, and what cannot be done is said.
 
 #include <csignal>
@@ -178,4 +179,3 @@ TEST_F(FullAtEveryWriteTest, DISABLED_OneProcessInManySteps) { ReconstructWithin
 
 }  // namespace
 }  // namespace meshwright::faults
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Old and new programs side by side while a reconstruction runs: through a rolling upgrade and back.
 
 #include <csignal>
@@ -88,4 +89,3 @@ TEST_F(UpgradeTest, AnotherMethodWaitsForItsOwnProgramsAndCostsNoCamera) {
 
 }  // namespace
 }  // namespace meshwright::faults
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes what a fuzzer starts from: FOLDER/TARGET/seed-N, and FOLDER/TARGET.dict. Prints the targets' names.
 #include <cstdio>
 #include <filesystem>
@@ -39,4 +40,3 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
-// SPDX-License-Identifier: Apache-2.0

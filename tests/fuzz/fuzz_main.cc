@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // libFuzzer's side: one program for all targets; MESHWRIGHT_FUZZ_TARGET names the one that is run.
 #include <cstddef>
 #include <cstdint>
@@ -29,4 +30,3 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   ChosenTarget().run(std::string(reinterpret_cast<const char*>(data), size));
   return 0;
 }
-// SPDX-License-Identifier: Apache-2.0

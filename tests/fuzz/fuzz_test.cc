@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every parser on what once broke it, on what is right, on every beginning of that, and on some thousand changes of it.
 // scripts/fuzz looks further.
 #include <algorithm>
@@ -96,4 +97,3 @@ TEST(FuzzRegressions, BelongToATarget) {
 
 }  // namespace
 }  // namespace meshwright::fuzz
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -103,4 +104,3 @@ std::vector<Target> GeometryTargets() {
 }
 
 }  // namespace meshwright::fuzz
-// SPDX-License-Identifier: Apache-2.0

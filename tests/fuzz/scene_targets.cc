@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -176,4 +177,3 @@ std::vector<Target> SceneTargets() {
 }
 
 }  // namespace meshwright::fuzz
-// SPDX-License-Identifier: Apache-2.0

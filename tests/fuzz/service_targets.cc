@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What clients and workers say, to a whole coordinator but for its network.
 #include <memory>
 #include <optional>
@@ -242,4 +243,3 @@ std::vector<Target> ServiceTargets() {
 }
 
 }  // namespace meshwright::fuzz
-// SPDX-License-Identifier: Apache-2.0

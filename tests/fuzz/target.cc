@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/fuzz/target.h"
 
 #include <iterator>
@@ -24,4 +25,3 @@ const Target* FindTarget(const std::string& name) {
 }
 
 }  // namespace meshwright::fuzz
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -28,4 +29,3 @@ std::vector<Target> TextTargets();
 std::vector<Target> ServiceTargets();
 
 }  // namespace meshwright::fuzz
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -145,4 +146,3 @@ std::vector<Target> TextTargets() {
 }
 
 }  // namespace meshwright::fuzz
-// SPDX-License-Identifier: Apache-2.0

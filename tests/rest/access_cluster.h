@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -63,4 +64,3 @@ class AccessCluster : public RestCluster {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

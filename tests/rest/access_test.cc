@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who may what, over real connections: the same keys over HTTP and gRPC, with and without TLS. The rows of the threat
 // table in docs/security.md name these tests.
 
@@ -326,4 +327,3 @@ TEST_F(AccessOverTheNetworkTest, WhatOthersReachAsksForKeys) {
 }  // namespace
 }  // namespace meshwright
 
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Clients that mean harm, directly and through nginx: what they do has no effect on others, and /healthz is answered at
 // once throughout.
 
@@ -300,4 +301,3 @@ TEST_F(AttacksTest, PicturesThatGrowWhenTheyAreLookedAt) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who may call over gRPC: with --api-token-file nobody without a key, whatever the method.
 
 #include <gmock/gmock.h>
@@ -78,4 +79,3 @@ TEST_F(GrpcTokenTest, NoMethodAnswersWithoutIt) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Malformed calls over HTTP and gRPC: each gets its code and a message that names what is wrong, and the service goes
 // on.
 
@@ -353,4 +354,3 @@ TEST_F(MalformedCallsTest, OverGrpc) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/rest/nginx.h"
 
 #include <chrono>
@@ -95,4 +96,3 @@ Nginx::~Nginx() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every option at its bounds and beyond them, as REST and gRPC take it.
 
 #include <string>
@@ -95,4 +96,3 @@ TEST_F(OptionBoundsOverTheNetworkTest, NestedAndLongTexts) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdlib>
@@ -120,4 +121,3 @@ class RestCluster : public testing::Test {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

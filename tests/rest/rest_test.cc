@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The REST interface over real connections: a scene uploaded in parts, followed, looked at and downloaded.
 
 #include <map>
@@ -444,4 +445,3 @@ TEST_F(RestTest, ServesThePageAndNothingBesideIt) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

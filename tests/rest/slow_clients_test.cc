@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Clients of event streams that do not read: they are dropped, and what waits for them takes no memory of the server.
 
 #include <fstream>
@@ -170,4 +171,3 @@ TEST_F(SlowClientsTest, WhoDoesNotReadIsDroppedAndTakesNoMemory) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two coordinators on one PostgreSQL and one folder of blobs: what one conducts, the other one shows all the same.
 
 #include "coordinator/store/postgres_testing.h"
@@ -115,4 +116,3 @@ TEST_F(TwoCoordinatorsTest, WhatOneConductsTheOtherShows) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whoever runs the service is told when a reconstruction is over, however it ends.
 
 #include <map>
@@ -81,4 +82,3 @@ TEST_F(WebhookTest, TellsOfEachEndOnce) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

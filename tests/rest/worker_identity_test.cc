@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which worker is which: nobody stops another's worker or brings its results by calling itself the same.
 
 #include <cstdlib>
@@ -110,4 +111,3 @@ TEST_F(WorkersJobTest, SettingsOfCertificatesThatMeanNothingAreRefused) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

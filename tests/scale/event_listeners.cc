@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/scale/event_listeners.h"
 
 #include <array>
@@ -92,4 +93,3 @@ bool EventListeners::Read(Client& client) {
 }
 
 }  // namespace meshwright::scale
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -39,4 +40,3 @@ class EventListeners {
 };
 
 }  // namespace meshwright::scale
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/scale/fake_worker.h"
 
 #include <optional>
@@ -70,4 +71,3 @@ void FakeWorker::Stop() {
 }
 
 }  // namespace meshwright::scale
-// SPDX-License-Identifier: Apache-2.0

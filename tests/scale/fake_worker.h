@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -40,4 +41,3 @@ class FakeWorker {
 };
 
 }  // namespace meshwright::scale
-// SPDX-License-Identifier: Apache-2.0

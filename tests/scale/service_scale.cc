@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The service without photographs: many reconstructions of a flat wall, many workers whose camera jobs only sleep, a
 // coordinator as a process of its own, PostgreSQL or SQLite. Prints what it measured as JSON. See docs/benchmarks.md.
 
@@ -206,4 +207,3 @@ int main(int argc, char** argv) {
   CLI11_PARSE(program, argc, argv);
   return meshwright::scale::Measure(settings);
 }
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/scale/wall_world.h"
 
 #include <algorithm>
@@ -79,4 +80,3 @@ PatchLattice WallWorld::FilteredSurface(CameraIndex index) {
 }
 
 }  // namespace meshwright::scale
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -25,4 +26,3 @@ class WallWorld {
 };
 
 }  // namespace meshwright::scale
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <functional>
 #include <string>
@@ -121,4 +122,3 @@ INSTANTIATE_TEST_SUITE_P(Formats, FaultInjection, testing::ValuesIn(SmallScenes(
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The same scene through every importer gives the mesh that it gives through COLMAP's text: in the same bytes, or,
 // where rotations go through another form or points are floats, nearly so.
 
@@ -81,4 +82,3 @@ INSTANTIATE_TEST_SUITE_P(All, SameMeshTest, testing::Range(size_t{0}, SceneWrite
 
 }  // namespace
 }  // namespace meshwright::end_to_end
-// SPDX-License-Identifier: Apache-2.0

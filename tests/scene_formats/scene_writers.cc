@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/scene_formats/scene_writers.h"
 
 #include <algorithm>
@@ -667,4 +668,3 @@ SceneFiles SmallSceneAs(const SceneWriter& writer) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

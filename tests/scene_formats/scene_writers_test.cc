@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every format that other programs write, from a scene written in it: poses, lenses and points come back.
 #include "tests/scene_formats/scene_writers.h"
 
@@ -223,4 +224,3 @@ TEST(RescaleCamerasTest, CamerasFollowPhotographsOfOneFactor) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The whole way from photographs and a mesh to a textured model, on a scene whose surface is known.
 
 #include <algorithm>
@@ -154,4 +155,3 @@ TEST_F(TextureTest, AMeshThatNoPhotographShowsIsRefused) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

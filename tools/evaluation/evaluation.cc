@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/evaluation/evaluation.h"
 
 #include <algorithm>
@@ -319,4 +320,3 @@ absl::StatusOr<EvaluationReport> Evaluate(const TriangleMesh& reconstruction, co
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

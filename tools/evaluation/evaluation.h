@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -79,4 +80,3 @@ nlohmann::ordered_json ToJson(const EvaluationReport& report);
 std::string ToText(const EvaluationReport& report);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/evaluation/evaluation.h"
 
 #include <cmath>
@@ -255,4 +256,3 @@ TEST(EvaluationTest, NormalsAndRoughnessAreThoseOfTheTriangles) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

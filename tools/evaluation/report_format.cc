@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <string>
 
 #include <absl/strings/str_format.h>
@@ -65,4 +66,3 @@ std::string ToText(const EvaluationReport& report) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/evaluation/seen_surface.h"
 
 #include <algorithm>
@@ -107,4 +108,3 @@ std::vector<SurfaceSample> SampleSurface(const TriangleMesh& mesh, int count) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

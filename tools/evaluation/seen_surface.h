@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -42,4 +43,3 @@ struct SurfaceSample {
 std::vector<SurfaceSample> SampleSurface(const TriangleMesh& mesh, int count);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/evaluation/surface_distance.h"
 
 #include <cmath>
@@ -81,4 +82,3 @@ double SurfaceDistance::Within(const Eigen::Vector3d& x, double radius) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/evaluation/surface_distance.h"
 
 #include <cmath>
@@ -35,4 +36,3 @@ TEST(PointCloudDistanceTest, NothingIsNearAnEmptyCloud) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/loss_accounting/loss_accounting.h"
 
 #include <algorithm>
@@ -237,4 +238,3 @@ LossReport LossAccounting::Account(const TriangleMesh& mesh, ThreadPool& pool) c
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

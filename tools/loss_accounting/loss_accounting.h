@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -83,4 +84,3 @@ class LossAccounting {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/loss_accounting/loss_accounting.h"
 
 #include <cmath>
@@ -167,4 +168,3 @@ TEST_F(LossAccountingTest, RefusesAGroundTruthThatIsNoMesh) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

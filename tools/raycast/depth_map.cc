@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/raycast/depth_map.h"
 
 #include <algorithm>
@@ -41,4 +42,3 @@ DepthMap RenderDepth(const MeshRayCaster& caster, const Camera& camera, int step
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -25,4 +26,3 @@ struct DepthMap {
 DepthMap RenderDepth(const MeshRayCaster& caster, const Camera& camera, int step, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

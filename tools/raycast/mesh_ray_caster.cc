@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/raycast/mesh_ray_caster.h"
 
 #include <algorithm>
@@ -247,4 +248,3 @@ Eigen::Vector3d MeshRayCaster::FaceNormal(int32_t face) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -67,4 +68,3 @@ class MeshRayCaster {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/raycast/mesh_ray_caster.h"
 
 #include <cmath>
@@ -143,4 +144,3 @@ TEST(RenderDepthTest, APlaneAcrossTheAxisHasOneDepthEverywhere) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/rendering/mesh_renderer.h"
 
 #include <algorithm>
@@ -156,4 +157,3 @@ Camera OrbitCamera(const Camera& camera, const Eigen::Vector3d& pivot, double ya
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

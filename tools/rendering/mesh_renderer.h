@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -52,4 +53,3 @@ class MeshRenderer {
 Camera OrbitCamera(const Camera& camera, const Eigen::Vector3d& pivot, double yaw, double pitch);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

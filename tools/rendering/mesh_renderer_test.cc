@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/rendering/mesh_renderer.h"
 
 #include <cmath>
@@ -71,4 +72,3 @@ TEST(OrbitCameraTest, KeepsThePivotInItsPlaceAndMovesRightAndUp) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

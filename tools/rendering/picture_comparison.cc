@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/rendering/picture_comparison.h"
 
 #include <cmath>
@@ -49,4 +50,3 @@ PictureComparison CompareWhereCovered(const ColorImage& picture, const ColorImag
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -25,4 +26,3 @@ PictureComparison CompareWhereCovered(const ColorImage& picture, const ColorImag
                                       const MeshRayCaster* truth = nullptr);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/rendering/picture_comparison.h"
 
 #include <gtest/gtest.h>
@@ -44,4 +45,3 @@ TEST(PictureComparison, WithTheTruthOnlyWhereTheSurfaceIsRight) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

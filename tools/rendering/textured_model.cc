@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/rendering/textured_model.h"
 
 #include <algorithm>
@@ -236,4 +237,3 @@ EdgeJumps MeasureEdgeJumps(const TexturedModel& model) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -53,4 +54,3 @@ struct EdgeJumps {
 EdgeJumps MeasureEdgeJumps(const TexturedModel& model);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

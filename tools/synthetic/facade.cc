@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -81,4 +82,3 @@ Stage BuildFacade(const SyntheticOptions& options) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

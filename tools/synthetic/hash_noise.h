@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -87,4 +88,3 @@ inline float FractalNoise(const Eigen::Vector3f& x, float largest, float persist
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

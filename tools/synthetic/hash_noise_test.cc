@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/synthetic/hash_noise.h"
 
 #include <algorithm>
@@ -63,4 +64,3 @@ TEST(FractalNoiseTest, NothingIsFinerThanTheFootprint) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/synthetic/house.h"
 
 #include <algorithm>
@@ -167,4 +168,3 @@ void AddHouse(WorldBuilder& builder, const SurfaceFrame& frame, const HouseStyle
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -25,4 +26,3 @@ struct HouseStyle {
 void AddHouse(WorldBuilder& builder, const SurfaceFrame& frame, const HouseStyle& style, uint32_t salt);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/synthetic/material.h"
 
 #include <algorithm>
@@ -115,4 +116,3 @@ Eigen::Vector3f Reflectance(Material material, const Eigen::Vector3f& x_in_world
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -35,4 +36,3 @@ Eigen::Vector3f Reflectance(Material material, const Eigen::Vector3f& x, const E
                             float footprint, uint32_t salt);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

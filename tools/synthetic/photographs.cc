@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/synthetic/photographs.h"
 
 #include <algorithm>
@@ -139,4 +140,3 @@ std::vector<ColorImage> TakePhotographs(const World& world, const MeshRayCaster&
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

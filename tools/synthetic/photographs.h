@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -26,4 +27,3 @@ std::vector<SparsePoint> FindSparsePoints(const MeshRayCaster& caster, const std
                                           ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

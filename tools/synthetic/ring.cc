@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -109,4 +110,3 @@ Stage BuildRing(const SyntheticOptions& options) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -170,4 +171,3 @@ Stage BuildRoom(const SyntheticOptions& options) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

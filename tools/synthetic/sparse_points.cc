@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -91,4 +92,3 @@ std::vector<SparsePoint> FindSparsePoints(const MeshRayCaster& caster, const std
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

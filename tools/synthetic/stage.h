@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -27,4 +28,3 @@ Camera LookAt(const SyntheticOptions& options, double focal_px, const Eigen::Vec
               const Eigen::Vector3d& target);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -118,4 +119,3 @@ Stage BuildStreet(const SyntheticOptions& options) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/synthetic/synthetic_scene.h"
 
 #include <algorithm>
@@ -145,4 +146,3 @@ absl::StatusOr<SyntheticScene> MakeSyntheticScene(const SyntheticOptions& option
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -56,4 +57,3 @@ absl::StatusOr<SyntheticScene> MakeSyntheticScene(const SyntheticOptions& option
 absl::Status WriteSyntheticScene(const SyntheticScene& scene, const std::string& folder, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/synthetic/synthetic_scene.h"
 
 #include <algorithm>
@@ -302,4 +303,3 @@ TEST(SyntheticOptionsTest, NamesTheFieldThatIsOutOfRange) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

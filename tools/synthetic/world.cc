@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/synthetic/world.h"
 
 #include <algorithm>
@@ -171,4 +172,3 @@ void AddRelief(WorldBuilder& builder, const SurfaceFrame& frame, const std::vect
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -82,4 +83,3 @@ void AddRelief(WorldBuilder& builder, const SurfaceFrame& frame, const std::vect
                double border_out, uint32_t salt);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -39,4 +40,3 @@ absl::Status WriteSyntheticScene(const SyntheticScene& scene, const std::string&
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

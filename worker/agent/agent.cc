@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/agent/agent.h"
 
 #include <algorithm>
@@ -287,4 +288,3 @@ void Agent::Run() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

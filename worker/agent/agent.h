@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -99,4 +100,3 @@ class Agent {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/agent/agent.h"
 
 #include <atomic>
@@ -338,4 +339,3 @@ TEST_F(HeldUpAgentTest, AJobThatOutlastsTheDrainIsReleased) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

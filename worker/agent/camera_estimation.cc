@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/agent/camera_estimation.h"
 
 #include <chrono>
@@ -100,4 +101,3 @@ absl::StatusOr<FinishedJob> EstimateCamerasOf(const v1::CameraJob& job, const Ca
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

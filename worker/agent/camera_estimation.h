@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -39,4 +40,3 @@ absl::StatusOr<FinishedJob> EstimateCamerasOf(const v1::CameraJob& job, const Ca
                                               const std::function<void(const std::string&, double)>& progress);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

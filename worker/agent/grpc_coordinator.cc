@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/agent/grpc_coordinator.h"
 
 #include <utility>
@@ -137,4 +138,3 @@ std::unique_ptr<GrpcCoordinator> GrpcCoordinator::Connect(const std::string& add
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

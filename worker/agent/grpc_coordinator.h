@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -25,4 +26,3 @@ class GrpcCoordinator : public WorkerChannel, public BlobStore {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

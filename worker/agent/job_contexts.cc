@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/agent/job_contexts.h"
 
 #include <utility>
@@ -64,4 +65,3 @@ absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::Make(const std::s
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

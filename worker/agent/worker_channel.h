@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -16,4 +17,3 @@ class WorkerChannel {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/camera_job/camera_job.h"
 
 #include <algorithm>
@@ -120,4 +121,3 @@ CameraJobOptions Reduced(CameraJobOptions options, int reduction) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -101,4 +102,3 @@ int64_t EstimateCameraJobBytes(const Camera& reference, const CameraJobOptions& 
 CameraJobOptions Reduced(CameraJobOptions options, int reduction);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

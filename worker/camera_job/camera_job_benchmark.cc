@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
 
 #include "worker/camera_job/camera_job.h"
@@ -76,4 +77,3 @@ BENCHMARK(BM_RefineSurface)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

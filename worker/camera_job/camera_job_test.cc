@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/camera_job/camera_job.h"
 
 #include <algorithm>
@@ -197,4 +198,3 @@ TEST_F(CameraJobTest, OptionsAreCheckedWithThoseOfTheStages) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/filtering/epipolar_offsets.h"
 
 #include <algorithm>
@@ -103,4 +104,3 @@ EpipolarOffsets MeasureEpipolarOffsets(const PatchScorer& scorer, const SurfaceE
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -22,4 +23,3 @@ struct EpipolarOffsets {
 EpipolarOffsets MeasureEpipolarOffsets(const PatchScorer& scorer, const SurfaceEstimate& surface, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

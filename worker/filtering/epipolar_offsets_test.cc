@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/filtering/epipolar_offsets.h"
 
 #include <algorithm>
@@ -90,4 +91,3 @@ TEST_F(EpipolarOffsetsTest, NumberOfThreadsChangesNothing) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/filtering/filtering.h"
 
 #include <algorithm>
@@ -169,4 +170,3 @@ PatchLattice MakeFilteredSurface(const SurfaceEstimate& surface, CameraIndex ref
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

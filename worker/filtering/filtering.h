@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -42,4 +43,3 @@ PatchLattice MakeFilteredSurface(const SurfaceEstimate& surface, CameraIndex ref
                                  const ColorImage& color);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/filtering/filtering.h"
 
 #include <algorithm>
@@ -163,4 +164,3 @@ TEST(FilteringOptions, ValidateNamesTheField) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/filtering/refinement.h"
 
 #include <algorithm>
@@ -204,4 +205,3 @@ int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& option
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/filtering/smoothing.h"
 
 #include <algorithm>
@@ -89,4 +90,3 @@ void SmoothDepth(const std::vector<float>& uncertainty, double focal, int max_ra
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -18,4 +19,3 @@ void SmoothDepth(const std::vector<float>& uncertainty, double focal, int max_ra
                  ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/filtering/smoothing.h"
 
 #include <cmath>
@@ -85,4 +86,3 @@ TEST(SmoothDepth, NumberOfThreadsChangesNothing) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

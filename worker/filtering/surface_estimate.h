@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -29,4 +30,3 @@ struct SurfaceEstimate {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

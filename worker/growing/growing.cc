@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/growing/growing.h"
 
 #include <algorithm>
@@ -262,4 +263,3 @@ PatchStacks Grow(const PatchScorer& scorer, const std::vector<Seed>& seeds, cons
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -54,4 +55,3 @@ PatchStacks Grow(const PatchScorer& scorer, const std::vector<Seed>& seeds, cons
 float InverseDepthStep(const Camera& reference, int lattice_step, float inverse_depth);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/growing/growing.h"
 
 #include <algorithm>
@@ -126,4 +127,3 @@ TEST(GrowingOptions, ValidateNamesTheField) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

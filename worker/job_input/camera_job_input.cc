@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/job_input/camera_job_input.h"
 
 #include <string>
@@ -109,4 +110,3 @@ int64_t EstimateInputBytes(const CameraJobSpec& spec, const std::vector<Camera>&
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/job_input/run_job.h"
 
 #include <algorithm>
@@ -77,4 +78,3 @@ absl::StatusOr<FinishedJob> RunJob(const Scene& scene, const CameraJobSpec& spec
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

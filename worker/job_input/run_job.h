@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -32,4 +33,3 @@ absl::StatusOr<FinishedJob> RunJob(const Scene& scene, const CameraJobSpec& spec
                                    const CameraJobFunction& job, BlobStore& blobs, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

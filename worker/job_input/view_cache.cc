@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/job_input/view_cache.h"
 
 #include <utility>
@@ -91,4 +92,3 @@ int64_t ViewCache::decoded_views() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

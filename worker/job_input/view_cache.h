@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -65,4 +66,3 @@ class ViewCache {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/job_input/view_cache.h"
 
 #include <atomic>
@@ -81,4 +82,3 @@ TEST(ViewCacheTest, ALoaderThatFailsIsAskedAgain) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

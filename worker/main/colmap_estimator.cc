@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/main/colmap_estimator.h"
 
 #include <filesystem>
@@ -47,4 +48,3 @@ CameraEstimator MakeColmapEstimator(std::string* why_not) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

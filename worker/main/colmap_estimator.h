@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -10,4 +11,3 @@ namespace meshwright {
 CameraEstimator MakeColmapEstimator(std::string* why_not);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

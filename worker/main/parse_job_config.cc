@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/main/parse_job_config.h"
 
 #include "pipeline/options/options_json.h"
@@ -12,4 +13,3 @@ absl::StatusOr<JobConfig> ParseJobConfig(const std::string& options_json) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

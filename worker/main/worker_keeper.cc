@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/main/worker_keeper.h"
 
 #include <csignal>
@@ -98,4 +99,3 @@ int KeepAlive(const std::function<int(bool ran_out_of_memory)>& work) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

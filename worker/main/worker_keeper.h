@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -19,4 +20,3 @@ absl::StatusOr<int64_t> CountOutOfMemoryKills();
 int KeepAlive(const std::function<int(bool ran_out_of_memory)>& work);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

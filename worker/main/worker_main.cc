@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <optional>
@@ -50,4 +51,3 @@ int main(int argc, char** argv) {
     return Work(settings);
   });
 }
-// SPDX-License-Identifier: Apache-2.0

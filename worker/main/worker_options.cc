@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/main/worker_options.h"
 
 #include "program/program_options.h"
@@ -39,4 +40,3 @@ void AddWorkerOptions(CLI::App& program, WorkerSettings& settings) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

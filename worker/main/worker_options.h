@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -10,4 +11,3 @@ namespace meshwright {
 void AddWorkerOptions(CLI::App& program, WorkerSettings& settings);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

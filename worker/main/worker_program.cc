@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/main/worker_program.h"
 
 #include <algorithm>
@@ -159,4 +160,3 @@ absl::StatusOr<std::unique_ptr<WorkerProgram>> WorkerProgram::Make(const WorkerS
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -41,4 +42,3 @@ class WorkerProgram {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

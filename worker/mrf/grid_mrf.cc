@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/mrf/grid_mrf.h"
 
 #include "common/base/check.h"
@@ -37,4 +38,3 @@ double MrfEnergy(const GridMrf& mrf, const std::vector<uint8_t>& labels) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

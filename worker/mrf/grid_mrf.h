@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -43,4 +44,3 @@ void CheckGridMrf(const GridMrf& mrf);
 double MrfEnergy(const GridMrf& mrf, const std::vector<uint8_t>& labels);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
 
 #include "common/base/thread_pool.h"
@@ -49,4 +50,3 @@ BENCHMARK(BM_SolveInWindows)
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

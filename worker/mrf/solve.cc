@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/mrf/solve.h"
 
 #include <algorithm>
@@ -99,4 +100,3 @@ MrfSolution SolveInWindows(const GridMrf& mrf, const TrwsOptions& options, Threa
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -54,4 +55,3 @@ MrfSolution SolveGlobal(const GridMrf& mrf, const TrwsOptions& options);
 MrfSolution SolveInWindows(const GridMrf& mrf, const TrwsOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/mrf/solve.h"
 
 #include <algorithm>
@@ -258,4 +259,3 @@ TEST(TrwsOptions, ValidateNamesFieldAndValue) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/mrf/synthetic_mrf_testing.h"
 
 #include <algorithm>
@@ -122,4 +123,3 @@ GridMrf MakeRandomMrf(int columns, int rows, int max_patches, double infinite_sh
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -20,4 +21,3 @@ GridMrf MakeRandomMrf(int columns, int rows, int max_patches, double infinite_sh
 double UniformReal(std::mt19937& random);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/mrf/trws.h"
 
 #include <algorithm>
@@ -238,4 +239,3 @@ double LabellingEnergy(const TrwsProblem& problem, const std::vector<uint8_t>& l
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -106,4 +107,3 @@ void RunIcm(const TrwsProblem& problem, std::vector<uint8_t>& labels);
 double LabellingEnergy(const TrwsProblem& problem, const std::vector<uint8_t>& labels);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/mrf/trws.h"
 
 #include <algorithm>
@@ -214,4 +215,3 @@ TEST(Trws, EmptyProblem) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/mrf/window.h"
 
 #include <algorithm>
@@ -215,4 +216,3 @@ WindowResult SolveWindow(const GridMrf& mrf, const NodeRect& window_rect, const 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

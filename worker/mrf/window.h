@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -51,4 +52,3 @@ WindowResult SolveWindow(const GridMrf& mrf, const NodeRect& window, const NodeR
                          const TrwsStopping& stopping, std::vector<uint8_t>& labels, SeamMessages& seams);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/photo_consistency/backdrop.h"
 
 #include <cstddef>
@@ -105,4 +106,3 @@ Backdrop::Backdrop(const SamplingImage& image) : columns_(image.width() / 2), ro
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

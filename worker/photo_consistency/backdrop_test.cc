@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/photo_consistency/backdrop.h"
 
 #include <cstdint>
@@ -58,4 +59,3 @@ TEST(Backdrop, OddSizesHaveNoUncoveredRim) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/photo_consistency/ncc_kernel.h"
 
 #include <cmath>
@@ -95,4 +96,3 @@ float Ncc(const NccInput& input) { return HWY_DYNAMIC_DISPATCH(NccImplementation
 
 }  // namespace meshwright
 #endif
-// SPDX-License-Identifier: Apache-2.0

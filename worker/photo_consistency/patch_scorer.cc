@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/photo_consistency/patch_scorer.h"
 
 #include <algorithm>
@@ -273,4 +274,3 @@ Eigen::Vector2f PatchScorer::AcrossEpipolarLine(int x, int y, float inverse_dept
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -118,4 +119,3 @@ class PatchScorer {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

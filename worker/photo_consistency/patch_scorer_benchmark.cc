@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
 
 #include "worker/photo_consistency/patch_scorer.h"
@@ -50,4 +51,3 @@ BENCHMARK(BM_MakeWindow)->DenseRange(2, 5);
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/photo_consistency/patch_scorer.h"
 
 #include <cmath>
@@ -328,4 +329,3 @@ TEST(PatchScorer, OutsideOfTheRegionNothingHasAScore) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

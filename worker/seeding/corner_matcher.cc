@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/corner_matcher.h"
 
 #include <algorithm>
@@ -107,4 +108,3 @@ std::vector<CornerHypothesis> CornerMatcher::Group(const Corner& corner, std::ve
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -49,4 +50,3 @@ class CornerMatcher {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/corner_seeds.h"
 
 #include <algorithm>
@@ -214,4 +215,3 @@ CornerSeeds SeedCorners(const SeedFitter& fitter, const std::vector<Seed>& known
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -24,4 +25,3 @@ CornerSeeds SeedCorners(const SeedFitter& fitter, const std::vector<Seed>& known
                         const Lattice& lattice, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

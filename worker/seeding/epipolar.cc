@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/epipolar.h"
 
 #include <algorithm>
@@ -79,4 +80,3 @@ EpipolarSegment EpipolarGeometry::SegmentOf(double x, double y, double min_w, do
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

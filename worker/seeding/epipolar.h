@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <Eigen/Core>
@@ -46,4 +47,3 @@ class EpipolarGeometry {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

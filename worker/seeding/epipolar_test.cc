@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/epipolar.h"
 
 #include <cmath>
@@ -74,4 +75,3 @@ TEST(EpipolarTest, CamerasAtOnePlaceMeasureNothing) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

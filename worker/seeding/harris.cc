@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/harris.h"
 
 #include <algorithm>
@@ -158,4 +159,3 @@ std::vector<Corner> DetectHarrisCorners(const SamplingImage& image, const Harris
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

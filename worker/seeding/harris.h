@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -35,4 +36,3 @@ constexpr int kHarrisMargin = 4;  // px
 std::vector<Corner> DetectHarrisCorners(const SamplingImage& image, const HarrisOptions& options, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

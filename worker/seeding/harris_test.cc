@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/harris.h"
 
 #include <algorithm>
@@ -128,4 +129,3 @@ TEST(HarrisTest, FlatImagesAndEdgesAndFaintNoiseHaveNone) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/pixel_index.h"
 
 #include <algorithm>
@@ -108,4 +109,3 @@ std::vector<int32_t> PixelIndex::FindNearest(const Eigen::Vector2f& place, int c
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

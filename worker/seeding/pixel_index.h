@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -35,4 +36,3 @@ class PixelIndex {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/pixel_index.h"
 
 #include <algorithm>
@@ -79,4 +80,3 @@ TEST(PixelIndexTest, FindsTheNearest) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

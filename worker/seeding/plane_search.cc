@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/plane_search.h"
 
 #include <algorithm>
@@ -97,4 +98,3 @@ ScoredPlane RefinePlane(const PatchObjective& objective, const ScoredPlane& star
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

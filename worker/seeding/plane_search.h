@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -59,4 +60,3 @@ ScoredPlane SearchDepth(const PatchObjective& objective, float w, const Relative
 ScoredPlane RefinePlane(const PatchObjective& objective, const ScoredPlane& start, float first_step, int rounds);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/point_seeds.h"
 
 #include <algorithm>
@@ -166,4 +167,3 @@ PointSeeds SeedPoints(const SeedFitter& fitter, const std::vector<SparsePointObs
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -20,4 +21,3 @@ struct PointSeeds {
 PointSeeds SeedPoints(const SeedFitter& fitter, const std::vector<SparsePointObservation>& points, ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/seed_fitter.h"
 
 #include <algorithm>
@@ -155,4 +156,3 @@ SeedFitter::Outcome SeedFitter::Fit(const Node& node, const PatchPlane& plane, i
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

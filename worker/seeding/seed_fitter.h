@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -73,4 +74,3 @@ class SeedFitter {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

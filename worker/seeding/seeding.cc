@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/seeding.h"
 
 #include <algorithm>
@@ -122,4 +123,3 @@ SeedingResult FindSeeds(const PatchScorer& scorer, const std::vector<SparsePoint
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

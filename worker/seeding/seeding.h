@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -57,4 +58,3 @@ SeedingResult FindSeeds(const PatchScorer& scorer, const std::vector<SparsePoint
                         ThreadPool& pool);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

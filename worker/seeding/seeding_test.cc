@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/seeding/seeding.h"
 
 #include <algorithm>
@@ -360,4 +361,3 @@ TEST(SeedingTest, OptionsNameWhatIsWrong) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/telemetry/measured_worker_channel.h"
 
 #include <utility>
@@ -157,4 +158,3 @@ void MeasuredWorkerChannel::CountAnswer(const v1::SynchronizeRequest& request,
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

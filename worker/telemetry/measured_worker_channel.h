@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -62,4 +63,3 @@ class MeasuredWorkerChannel final : public WorkerChannel {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/telemetry/measured_worker_channel.h"
 
 #include <string>
@@ -144,4 +145,3 @@ TEST_F(MeasuredWorkerChannelTest, WhatTheWorkerOffersIsTold) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

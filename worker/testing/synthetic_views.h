@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -94,4 +95,3 @@ inline SyntheticViews MakeSyntheticViews(int step) {
 }
 
 }  // namespace meshwright::testing_world
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/visibility/accepted_depth.h"
 
 #include <algorithm>
@@ -174,4 +175,3 @@ AcceptedDepth AcceptedDepthBuffer::Depth() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "worker/visibility/accepted_depth.h"
 
 #include <algorithm>
@@ -222,4 +223,3 @@ TEST(AcceptedDepthTest, WhatIsBehindTheCameraOrInNoTriangleIsLeftOut) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/glb.h"
 
 #include <array>
@@ -124,4 +125,3 @@ absl::Status WriteGlb(const MeshRows& mesh, const std::string& path) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -32,4 +33,3 @@ absl::Status WriteCompressed(PrimitiveArrays arrays, const PositionLattice& latt
 }  // namespace glb
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/glb_compression.h"
 
 #include <algorithm>
@@ -224,4 +225,3 @@ void DescribeCompressedBuffers(Description& description) {
 }
 
 }  // namespace meshwright::glb
-// SPDX-License-Identifier: Apache-2.0

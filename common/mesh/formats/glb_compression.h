@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -68,4 +69,3 @@ nlohmann::json CompressedMeshNode(const Eigen::Vector3d& offset, const PositionL
 void DescribeCompressedBuffers(Description& description);
 
 }  // namespace meshwright::glb
-// SPDX-License-Identifier: Apache-2.0

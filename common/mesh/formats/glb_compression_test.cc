@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/glb_compression.h"
 
 #include <algorithm>
@@ -227,4 +228,3 @@ TEST_F(GlbCompressionTest, AnEmptyMeshIsASceneWithoutNodes) { EXPECT_FALSE(Write
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/glb_container.h"
 
 #include <limits>
@@ -77,4 +78,3 @@ absl::StatusOr<std::string> Head(const Description& description, size_t json_byt
 }
 
 }  // namespace meshwright::glb
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -45,4 +46,3 @@ size_t AddAccessor(uint64_t count, uint64_t row_bytes, int component, const char
 absl::StatusOr<std::string> Head(const Description& description, size_t json_bytes, const std::string& path);
 
 }  // namespace meshwright::glb
-// SPDX-License-Identifier: Apache-2.0

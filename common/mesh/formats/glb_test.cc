@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/glb.h"
 
 #include <filesystem>
@@ -112,4 +113,3 @@ TEST_F(GlbTest, FolderThatDoesNotExistIsAnErrorThatNamesTheFile) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

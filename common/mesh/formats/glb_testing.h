@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -51,4 +52,3 @@ inline Eigen::Vector3f VectorAt(const char* bytes) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -38,4 +39,3 @@ inline Eigen::Vector3f UnitOrAny(const Eigen::Vector3f& normal) {
 }
 
 }  // namespace meshwright::glb
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/las.h"
 
 #include <cmath>
@@ -118,4 +119,3 @@ absl::Status WriteLas(const MeshRows& mesh, const std::string& path) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

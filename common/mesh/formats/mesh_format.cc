@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/mesh_format.h"
 
 #include <algorithm>
@@ -162,4 +163,3 @@ absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, b
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

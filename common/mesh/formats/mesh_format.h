@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -51,4 +52,3 @@ absl::Status ConvertPly(const std::string& ply_path, const MeshFormat& format, b
                         const MeshWriteOptions& options = {});
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/mesh_format.h"
 
 #include <cmath>
@@ -263,4 +264,3 @@ TEST_F(MeshFormatTest, PointsAreTheVerticesAlone) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

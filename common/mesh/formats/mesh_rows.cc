@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/mesh_rows.h"
 
 #include <algorithm>
@@ -167,4 +168,3 @@ MeshRows::Bounds MeshRows::FindBounds() const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

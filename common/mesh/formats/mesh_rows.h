@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -89,4 +90,3 @@ class MeshRows {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/obj.h"
 
 #include <absl/strings/str_cat.h>
@@ -46,4 +47,3 @@ absl::Status WriteObj(const MeshRows& mesh, const std::string& path) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

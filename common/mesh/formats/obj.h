@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -13,4 +14,3 @@ namespace meshwright {
 absl::Status WriteObj(const MeshRows& mesh, const std::string& path);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <charconv>
@@ -33,4 +34,3 @@ inline void AppendPosition(const Eigen::Vector3f& position, const Eigen::Vector3
 }
 
 }  // namespace meshwright::obj
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -31,4 +32,3 @@ inline void AppendVector(const Eigen::Vector3f& vector, std::string& bytes) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/scratch_array.h"
 
 #include <cerrno>
@@ -37,4 +38,3 @@ absl::StatusOr<std::shared_ptr<void>> MapScratch(size_t bytes, const std::string
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

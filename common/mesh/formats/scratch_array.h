@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -39,4 +40,3 @@ class ScratchArray {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/stl.h"
 
 #include <limits>
@@ -51,4 +52,3 @@ absl::Status WriteStl(const MeshRows& mesh, const std::string& path) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -14,4 +15,3 @@ namespace meshwright {
 absl::Status WriteStl(const MeshRows& mesh, const std::string& path);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/textured_mesh_writer.h"
 
 #include <filesystem>
@@ -255,4 +256,3 @@ absl::StatusOr<std::unique_ptr<TexturedMeshWriter>> TexturedMeshWriter::Create(
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

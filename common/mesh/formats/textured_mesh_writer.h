@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -46,4 +47,3 @@ class TexturedMeshWriter {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

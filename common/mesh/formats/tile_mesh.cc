@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/tile_mesh.h"
 
 #include <algorithm>
@@ -182,4 +183,3 @@ std::vector<Eigen::Vector3f> SnappedPositions(const TileMesh& mesh, const TileTr
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

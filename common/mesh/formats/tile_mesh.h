@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -41,4 +42,3 @@ TileMesh ParentMesh(const std::vector<TileMesh>& children, const TileTree& tree,
 std::vector<Eigen::Vector3f> SnappedPositions(const TileMesh& mesh, const TileTree& tree, const Tile& tile);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/tile_mesh.h"
 
 #include <algorithm>
@@ -168,4 +169,3 @@ TEST_F(TileMeshTest, AMeshOfOnePointIsOneLeaf) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

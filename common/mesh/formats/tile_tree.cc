@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/tile_tree.h"
 
 #include <algorithm>
@@ -98,4 +99,3 @@ void TileTree::Divide(size_t max_faces) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

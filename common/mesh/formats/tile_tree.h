@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -74,4 +75,3 @@ class TileTree {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

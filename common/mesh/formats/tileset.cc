@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/tileset.h"
 
 #include <algorithm>
@@ -195,4 +196,3 @@ absl::Status WriteTileset(const MeshRows& mesh, const std::string& path, const T
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

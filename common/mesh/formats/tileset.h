@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -33,4 +34,3 @@ struct TilesetOptions {
 absl::Status WriteTileset(const MeshRows& mesh, const std::string& path, const TilesetOptions& options = {});
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

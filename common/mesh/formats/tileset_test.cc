@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/mesh/formats/tileset.h"
 
 #include <algorithm>
@@ -236,4 +237,3 @@ TEST_F(TilesetTest, ServicesAreToldThatItIsAFolder) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

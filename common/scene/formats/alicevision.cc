@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/alicevision.h"
 
 #include <algorithm>
@@ -221,4 +222,3 @@ absl::StatusOr<Scene> ImportAliceVision(const std::string& file, const ImportOpt
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/assemble.h"
 
 #include <algorithm>
@@ -380,4 +381,3 @@ std::string FirstFileEndingIn(const std::string& folder, const std::string& suff
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -71,4 +72,3 @@ std::vector<std::string> FilesEndingIn(const std::string& folder, const std::str
 std::string FirstFileEndingIn(const std::string& folder, const std::string& suffix);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

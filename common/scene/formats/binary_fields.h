@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <bit>
@@ -94,4 +95,3 @@ class BinaryFields {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/blocks_exchange.h"
 
 #include <algorithm>
@@ -167,4 +168,3 @@ absl::StatusOr<Scene> ImportBlocksExchange(const std::string& file, const Import
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/bundler.h"
 
 #include <filesystem>
@@ -167,4 +168,3 @@ absl::StatusOr<Scene> ImportBundler(const std::string& file, const ImportOptions
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -19,4 +20,3 @@ std::string FindBundler(const std::string& folder);
 absl::StatusOr<Scene> ImportBundler(const std::string& file, const ImportOptions& options);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

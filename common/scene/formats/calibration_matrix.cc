@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/calibration_matrix.h"
 
 #include <algorithm>
@@ -35,4 +36,3 @@ absl::StatusOr<Eigen::Matrix3d> ReadMatrix(TextFields* fields, const char* name)
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <Eigen/Core>
@@ -15,4 +16,3 @@ absl::StatusOr<Lens> LensFromCalibrationMatrix(const Eigen::Matrix3d& k, const P
 absl::StatusOr<Eigen::Matrix3d> ReadMatrix(TextFields* fields, const char* name);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/colmap_binary.h"
 
 #include <utility>
@@ -112,4 +113,3 @@ absl::StatusOr<Scene> ImportColmapBinary(const std::string& folder, const Import
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

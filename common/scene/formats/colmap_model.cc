@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/colmap_model.h"
 
 #include <algorithm>
@@ -224,4 +225,3 @@ std::vector<std::string> ColmapImageFolders(const std::string& model_folder) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

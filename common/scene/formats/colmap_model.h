@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -72,4 +73,3 @@ absl::StatusOr<std::string> ChooseColmapModel(const std::string& folder, const s
 std::vector<std::string> ColmapImageFolders(const std::string& model_folder);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/colmap_text.h"
 
 #include <limits>
@@ -133,4 +134,3 @@ absl::StatusOr<Scene> ImportColmapText(const std::string& folder, const ImportOp
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

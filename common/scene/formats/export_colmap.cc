@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/export_colmap.h"
 
 #include <charconv>
@@ -153,4 +154,3 @@ absl::Status ExportColmapText(const Scene& scene, const std::string& folder) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -16,4 +17,3 @@ namespace meshwright {
 absl::Status ExportColmapText(const Scene& scene, const std::string& folder);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/formats.h"
 
 #include "common/scene/formats/alicevision.h"
@@ -58,4 +59,3 @@ const std::vector<SceneFormat>& SceneFormats() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -23,4 +24,3 @@ struct SceneFormat {
 const std::vector<SceneFormat>& SceneFormats();
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

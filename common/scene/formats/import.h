@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -21,4 +22,3 @@ absl::StatusOr<Scene> ImportScene(const std::string& path, const ImportOptions& 
 bool HoldsScene(const std::string& path);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

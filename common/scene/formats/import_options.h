@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -18,4 +19,3 @@ struct ImportOptions {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/import.h"
 
 #include <filesystem>
@@ -579,4 +580,3 @@ TEST(ExportColmapText, RefusesWhatColmapCannotSay) {
 
 }  // namespace
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/json_node.h"
 
 #include <algorithm>
@@ -169,4 +170,3 @@ absl::StatusOr<int> JsonNode::Side(const std::string& name) const {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -78,4 +79,3 @@ class JsonNode {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

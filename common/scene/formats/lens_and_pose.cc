@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/lens_and_pose.h"
 
 namespace meshwright {
@@ -23,4 +24,3 @@ void SetDistortion(const RadialTangential& distortion, Lens* lens) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

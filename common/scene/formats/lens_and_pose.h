@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <Eigen/Core>
@@ -28,4 +29,3 @@ inline Rigid3 PoseFromCenter(const Eigen::Matrix3d& cam_from_world, const Eigen:
 inline Eigen::Matrix3d FlipYAndZ(const Eigen::Matrix3d& rows) { return Eigen::Vector3d(1, -1, -1).asDiagonal() * rows; }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/masks.h"
 
 #include <algorithm>
@@ -103,4 +104,3 @@ absl::Status FindMasks(const std::vector<std::string>& image_folders, const std:
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

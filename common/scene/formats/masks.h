@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -17,4 +18,3 @@ namespace meshwright {
 absl::Status FindMasks(const std::vector<std::string>& image_folders, const std::string& masks_folder, Scene* scene);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/metashape.h"
 
 #include <filesystem>
@@ -177,4 +178,3 @@ absl::StatusOr<Scene> ImportMetashape(const std::string& file, const ImportOptio
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

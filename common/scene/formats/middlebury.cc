@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/middlebury.h"
 
 #include <utility>
@@ -65,4 +66,3 @@ absl::StatusOr<Scene> ImportMiddlebury(const std::string& folder, const ImportOp
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

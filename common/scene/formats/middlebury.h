@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -15,4 +16,3 @@ namespace meshwright {
 absl::StatusOr<Scene> ImportMiddlebury(const std::string& folder, const ImportOptions& options);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/mvsnet.h"
 
 #include <cmath>
@@ -92,4 +93,3 @@ absl::StatusOr<Scene> ImportMvsNet(const std::string& folder, const ImportOption
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -20,4 +21,3 @@ std::string FindMvsNet(const std::string& folder);
 absl::StatusOr<Scene> ImportMvsNet(const std::string& folder, const ImportOptions& options);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/nvm.h"
 
 #include <algorithm>
@@ -169,4 +170,3 @@ absl::StatusOr<Scene> ImportNvm(const std::string& file, const ImportOptions& op
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

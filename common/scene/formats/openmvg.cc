@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/openmvg.h"
 
 #include <filesystem>
@@ -183,4 +184,3 @@ absl::StatusOr<Scene> ImportOpenMvg(const std::string& file, const ImportOptions
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

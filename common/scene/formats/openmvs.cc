@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/openmvs.h"
 
 #include <algorithm>
@@ -229,4 +230,3 @@ absl::StatusOr<Scene> ImportOpenMvs(const std::string& file, const ImportOptions
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/opensfm.h"
 
 #include <algorithm>
@@ -176,4 +177,3 @@ absl::StatusOr<Scene> ImportOpenSfm(const std::string& folder, const ImportOptio
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

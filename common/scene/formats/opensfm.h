@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -19,4 +20,3 @@ std::string FindOpenSfm(const std::string& folder);
 absl::StatusOr<Scene> ImportOpenSfm(const std::string& folder, const ImportOptions& options);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/pose_folders.h"
 
 #include <algorithm>
@@ -215,4 +216,3 @@ absl::StatusOr<Scene> ImportTanksAndTemples(const std::string& file, const Impor
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -28,4 +29,3 @@ std::string FindTanksAndTemples(const std::string& folder);
 absl::StatusOr<Scene> ImportTanksAndTemples(const std::string& file, const ImportOptions& options);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

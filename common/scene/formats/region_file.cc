@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/region_file.h"
 
 #include <algorithm>
@@ -85,4 +86,3 @@ absl::Status SetRegion(const std::string& region, const std::string& folder, Sce
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -22,4 +23,3 @@ absl::StatusOr<OrientedBox> RegionOfPoints(const Scene& scene);
 absl::Status SetRegion(const std::string& region, const std::string& folder, Scene* scene);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

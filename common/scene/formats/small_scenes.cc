@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/small_scenes.h"
 
 #include <array>
@@ -152,4 +153,3 @@ SceneFiles SmallStrecha() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <map>
@@ -28,4 +29,3 @@ SceneFiles SmallMiddlebury();
 SceneFiles SmallStrecha();
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/strecha.h"
 
 #include <utility>
@@ -72,4 +73,3 @@ absl::StatusOr<Scene> ImportStrecha(const std::string& folder, const ImportOptio
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

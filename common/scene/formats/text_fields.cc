@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/text_fields.h"
 
 #include <charconv>
@@ -127,4 +128,3 @@ absl::Status TextFields::ExpectEnd() {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

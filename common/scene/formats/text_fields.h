@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -67,4 +68,3 @@ class TextFields {
 };
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

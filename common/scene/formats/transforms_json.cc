@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/transforms_json.h"
 
 #include <cmath>
@@ -195,4 +196,3 @@ absl::StatusOr<Scene> ImportTransformsJson(const std::string& file, const Import
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

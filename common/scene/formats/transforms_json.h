@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -18,4 +19,3 @@ std::string FindTransformsJson(const std::string& folder);
 absl::StatusOr<Scene> ImportTransformsJson(const std::string& file, const ImportOptions& options);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/world_offset.h"
 
 #include <algorithm>
@@ -59,4 +60,3 @@ void MoveNearZero(Scene* scene) {
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

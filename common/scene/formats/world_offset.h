@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "common/scene/scene.h"
@@ -11,4 +12,3 @@ namespace meshwright {
 void MoveNearZero(Scene* scene);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/scene/formats/xml_fields.h"
 
 #include <absl/strings/str_cat.h>
@@ -72,4 +73,3 @@ std::string FindXmlWithRoot(const std::string& folder, const std::string& root) 
 }
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -40,4 +41,3 @@ class XmlFields {
 std::string FindXmlWithRoot(const std::string& folder, const std::string& root);
 
 }  // namespace meshwright
-// SPDX-License-Identifier: Apache-2.0

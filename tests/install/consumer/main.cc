@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 #include <iostream>
 #include <optional>
@@ -19,4 +20,3 @@ int main(int argc, char** argv) {
               mesh->faces.size());
   return mesh->faces.empty() || static_cast<size_t>(done->faces) != mesh->faces.size() ? 1 : 0;
 }
-// SPDX-License-Identifier: Apache-2.0
