@@ -3,6 +3,6 @@
 
 namespace meshwright {
 
-const int kMethodVersion = 2;
+const int kMethodVersion = 3;
 
 }  // namespace meshwright

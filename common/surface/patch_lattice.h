@@ -21,12 +21,15 @@ struct PatchLattice {
   static constexpr uint8_t kLinkRight = 1;
   static constexpr uint8_t kLinkDown = 2;
 
+  // Of patches that no photograph confirms: what surrounds them says where they lie.
+  static constexpr float kInferredQuality = 0;
+
   CameraIndex camera_index = 0;
   Camera camera;
   Lattice lattice;
   std::vector<float> depth;                      // z in the camera's frame, scene units
   std::vector<Eigen::Vector3f> normal_in_world;  // unit, towards the camera
-  std::vector<float> quality;                    // photo-consistency, in [-1, 1]
+  std::vector<float> quality;                    // photo-consistency, in [-1, 1]; kInferredQuality: not measured
   std::vector<std::array<uint8_t, 3>> rgb;       // the reference photograph at the node
   std::vector<uint8_t> links;
 
@@ -46,9 +49,19 @@ struct PatchLattice {
 
   bool HasPatch(int64_t node) const { return depth[static_cast<size_t>(node)] > 0; }
 
+  bool IsInferred(int64_t node) const {
+    return HasPatch(node) && quality[static_cast<size_t>(node)] == kInferredQuality;
+  }
+
   int64_t CountPatches() const {
     int64_t count = 0;
     for (const float z : depth) count += z > 0 ? 1 : 0;
+    return count;
+  }
+
+  int64_t CountInferred() const {
+    int64_t count = 0;
+    for (int64_t node = 0; node < lattice.nodes(); ++node) count += IsInferred(node) ? 1 : 0;
     return count;
   }
 

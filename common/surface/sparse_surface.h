@@ -35,6 +35,7 @@ struct SparseSurface {
   PatchLattice ToLattice() const;
 
   size_t patches() const { return node.size(); }
+  bool IsInferred(size_t patch) const { return quality[patch] == PatchLattice::kInferredQuality; }
   int Column(size_t patch) const { return node[patch] % lattice.columns; }
   int Row(size_t patch) const { return node[patch] / lattice.columns; }
   // Centre X of the patch in world coordinates.

@@ -32,8 +32,8 @@ class SupportIndex {
     for (int row = 0; row < lattice.rows; ++row) ray_y_.push_back(camera.RayInCam(0, lattice.PixelY(row) + 0.5).y());
   }
 
-  // Whether the supporter looks through the point: it sees a surface more than `clearance` behind it on all four rays
-  // around it.
+  // Whether the supporter looks through the point: it has measured a surface more than `clearance` behind it on all four
+  // rays around it.
   bool SeesThrough(const Eigen::Vector3d& x_in_cam, double clearance) const {
     if (x_in_cam.z() <= clearance) return false;
     const Lattice& lattice = surface_.lattice;
@@ -42,14 +42,15 @@ class SupportIndex {
     const int64_t node = lattice.Index(static_cast<int>(at.x()), static_cast<int>(at.y()));
     for (const int64_t corner : {node, node + 1, node + lattice.columns, node + lattice.columns + 1}) {
       const int32_t patch = finder_.At(corner);
-      if (patch == PatchFinder::kNone) return false;
+      if (patch == PatchFinder::kNone || surface_.IsInferred(static_cast<size_t>(patch))) return false;
       if (surface_.depth[static_cast<size_t>(patch)] < x_in_cam.z() + clearance) return false;
     }
     return true;
   }
 
-  // Whether a patch centre lies within `radius` of the point (in the supporter's frame).
-  bool HasPatchNear(const Eigen::Vector3d& x_in_cam, double radius) const {
+  // Whether a patch centre lies within `radius` of the point (in the supporter's frame). Inferred patches count for the
+  // like alone.
+  bool HasPatchNear(const Eigen::Vector3d& x_in_cam, double radius, bool is_inferred) const {
     if (x_in_cam.z() <= radius) return false;  // a ball that holds the camera: its window would be the whole image
     const Camera& camera = surface_.camera;
     const Lattice& lattice = surface_.lattice;
@@ -69,7 +70,7 @@ class SupportIndex {
     const double squared_radius = radius * radius;
     // Where surfaces agree, the node in the middle of the window says so at once.
     const int32_t middle = finder_.At(lattice.Index((first_column + last_column) / 2, (first_row + last_row) / 2));
-    if (middle != PatchFinder::kNone && IsNear(middle, x_in_cam, squared_radius)) return true;
+    if (middle != PatchFinder::kNone && IsNear(middle, x_in_cam, squared_radius, is_inferred)) return true;
     const auto low_depth = static_cast<float>(x_in_cam.z() - radius) * (1 - kDepthSlack);
     const auto high_depth = static_cast<float>(x_in_cam.z() + radius) * (1 + kDepthSlack);
     for (int row = first_row; row <= last_row; ++row) {
@@ -77,7 +78,7 @@ class SupportIndex {
       for (int32_t patch = finder_.FirstFrom(lattice.Index(first_column, row)); patch < end; ++patch) {
         const float depth = surface_.depth[static_cast<size_t>(patch)];
         if (depth < low_depth || depth > high_depth) continue;
-        if (IsNear(patch, x_in_cam, squared_radius)) return true;
+        if (IsNear(patch, x_in_cam, squared_radius, is_inferred)) return true;
       }
     }
     return false;
@@ -98,8 +99,9 @@ class SupportIndex {
     return {(x * z - reach) / denominator, (x * z + reach) / denominator};
   }
 
-  bool IsNear(int32_t patch, const Eigen::Vector3d& x_in_cam, double squared_radius) const {
+  bool IsNear(int32_t patch, const Eigen::Vector3d& x_in_cam, double squared_radius, bool is_inferred) const {
     const auto at = static_cast<size_t>(patch);
+    if (surface_.IsInferred(at) && !is_inferred) return false;
     const double z = surface_.depth[at];
     const double dx = z * ray_x_[static_cast<size_t>(surface_.Column(at))] - x_in_cam.x();
     const double dy = z * ray_y_[static_cast<size_t>(surface_.Row(at))] - x_in_cam.y();
@@ -152,7 +154,7 @@ void CountVotes(const PatchLattice& filtered, const SparseSurface& supporter, in
         const double coarser = LevelOfDetail(supporter.camera, x_in_supporter.z(), supporter.lattice.step);
         const double radius =
             options.support_radius_steps * std::max(detail, std::min(coarser, kMaxCoarseness * detail));
-        if (index.HasPatchNear(x_in_supporter, radius)) {
+        if (index.HasPatchNear(x_in_supporter, radius, filtered.IsInferred(static_cast<int64_t>(node)))) {
           votes[node].support = OneMore(votes[node].support);
         } else if (index.SeesThrough(x_in_supporter, kClearanceInRadii * radius)) {
           votes[node].conflicts = OneMore(votes[node].conflicts);
@@ -214,7 +216,8 @@ absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int
   result.supporters_loaded = supporters;
   result.accepted = filtered;
   for (size_t node = 0; node < votes.size(); ++node) {
-    if (!IsAccepted(votes[node], options)) ClearNode(static_cast<int64_t>(node), result.accepted);
+    const auto index = static_cast<int64_t>(node);
+    if (!IsAccepted(votes[node], options) || filtered.IsInferred(index)) ClearNode(index, result.accepted);
   }
   DropDanglingLinks(result.accepted);
   result.patches_accepted = result.accepted.CountPatches();
@@ -230,7 +233,7 @@ absl::StatusOr<FinalSurface> JudgeAgain(const PatchLattice& filtered, const Patc
   for (size_t node = 0; node < votes.size(); ++node) {
     const auto index = static_cast<int64_t>(node);
     const bool stays = IsAccepted(votes[node], options);
-    if (!stays && filtered.HasPatch(index)) {
+    if (!stays && filtered.HasPatch(index) && !filtered.IsInferred(index)) {
       const bool is_contradicted = votes[node].conflicts > 0 && votes[node].conflicts >= votes[node].support;
       ++(is_contradicted ? surface.contradicted : surface.unsupported);
     }

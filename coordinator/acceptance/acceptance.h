@@ -43,6 +43,9 @@ using SurfaceLoader = std::function<absl::StatusOr<std::shared_ptr<const SparseS
 // against the patch; it must have more cameras for it than against it. False surface floats in front of true surface
 // that others see, and two wrong cameras that agree by chance are outvoted.
 //
+// Ours: inferred patches (PatchLattice::IsInferred) are not accepted here, and say neither yes nor no to what was
+// measured. They wait until all cameras are there (JudgeAgain).
+//
 // `supporters` surfaces are asked for in order, each once; the result does not depend on their order.
 absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int supporters, const SurfaceLoader& load,
                                                const AcceptanceOptions& options, ThreadPool& pool);
@@ -50,8 +53,8 @@ absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int
 // What a filtered surface comes to once every camera is committed.
 struct FinalSurface {
   PatchLattice kept;  // M_r less the patches that as many cameras look through as support
-  PatchLattice late;  // what of F_r is not in M_r and has found its supporters since
-  // The other patches of F_r.
+  PatchLattice late;  // what of F_r is not in M_r and has found its supporters since, or was inferred by them as well
+  // The other patches of F_r, less what was inferred.
   int64_t contradicted = 0;  // at least as many cameras look through them as support them, and at least one does
   int64_t unsupported = 0;   // too few cameras found them, none of them speaks against
 };

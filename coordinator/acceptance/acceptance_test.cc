@@ -173,6 +173,49 @@ TEST(Acceptance, JudgedAgainByAllCameras) {
   EXPECT_GT(outvoted, 0);
 }
 
+// Inferred patches wait for the last judgement, ask for a camera that infers or measures the same, and change nothing
+// about what was measured.
+TEST(Acceptance, InferredPatchesHaveNoSayAboutMeasuredOnes) {
+  std::mt19937 generator(7);
+  ThreadPool pool(2);
+  const Camera camera = CameraAt({0, 0, 0}, 0, 40);
+  PatchLattice wall = RandomSurface(0, camera, 1, 0, generator);
+  std::fill(wall.depth.begin(), wall.depth.end(), 10.0F);
+  std::fill(wall.quality.begin(), wall.quality.end(), 0.9F);
+  PatchLattice inferred_wall = wall;
+  std::fill(inferred_wall.quality.begin(), inferred_wall.quality.end(), PatchLattice::kInferredQuality);
+  PatchLattice floating = wall;
+  std::fill(floating.depth.begin(), floating.depth.end(), 5.0F);
+  const PatchLattice nothing = PatchLattice::Empty(0, camera, 1);
+  const auto as_camera = [](PatchLattice surface, CameraIndex index) {
+    surface.camera_index = index;
+    return surface;
+  };
+  const int64_t all = wall.CountPatches();
+  const int64_t rim = 2 * (wall.lattice.columns + wall.lattice.rows);
+
+  const std::vector<PatchLattice> inferred = {as_camera(inferred_wall, 1)};
+  const std::vector<PatchLattice> measured = {as_camera(wall, 1)};
+  EXPECT_EQ(AcceptSurface(wall, 1, LoaderOf(inferred), {}, pool)->patches_accepted, 0) << "no support for a measured one";
+  EXPECT_EQ(AcceptSurface(inferred_wall, 1, LoaderOf(measured), {}, pool)->patches_accepted, 0) << "not yet";
+  for (const auto& supporters : {inferred, measured}) {
+    const auto judged = JudgeAgain(inferred_wall, nothing, 1, LoaderOf(supporters), {}, pool);
+    EXPECT_EQ(judged->late.CountInferred(), all);
+    EXPECT_EQ(judged->unsupported, 0);
+  }
+  const auto alone = JudgeAgain(inferred_wall, nothing, 0, LoaderOf({}), {}, pool);
+  EXPECT_EQ(alone->late.CountPatches(), 0);
+  EXPECT_EQ(alone->unsupported, 0) << "what was inferred in vain is no loss";
+
+  // Whoever only infers a wall does not look through what is before it; who measured it does.
+  const std::vector<PatchLattice> one_for_it = {as_camera(floating, 1), as_camera(inferred_wall, 2)};
+  EXPECT_EQ(AcceptSurface(floating, 2, LoaderOf(one_for_it), {}, pool)->patches_accepted, all);
+  PatchLattice inferred_floating = floating;
+  std::fill(inferred_floating.quality.begin(), inferred_floating.quality.end(), PatchLattice::kInferredQuality);
+  const std::vector<PatchLattice> one_against_it = {as_camera(inferred_floating, 1), as_camera(wall, 2)};
+  EXPECT_LE(JudgeAgain(inferred_floating, nothing, 2, LoaderOf(one_against_it), {}, pool)->late.CountPatches(), rim);
+}
+
 TEST(Acceptance, LinksStayWhereBothEndsDo) {
   std::mt19937 generator(2);
   ThreadPool pool(2);
@@ -207,6 +250,7 @@ TEST(Acceptance, WhatMoreCamerasLookThroughThanSupportIsRefused) {
   const Camera camera = CameraAt({0, 0, 0}, 0, 40);
   PatchLattice wall = RandomSurface(0, camera, 1, 0, generator);
   std::fill(wall.depth.begin(), wall.depth.end(), 10.0F);
+  std::fill(wall.quality.begin(), wall.quality.end(), 0.9F);
   PatchLattice floating = wall;
   std::fill(floating.depth.begin(), floating.depth.end(), 5.0F);
   const auto as_camera = [](PatchLattice surface, CameraIndex index) {

@@ -57,6 +57,7 @@ absl::StatusOr<JudgedSurfaces> JudgeCommittedSurfaces(const std::vector<Committe
     MW_RETURN_IF_ERROR(AddSurface(judged.late, surface.accepted, put, late));
     result.cameras.push_back({.camera = surface.accepted.camera,
                               .kept = judged.kept.CountPatches() + judged.late.CountPatches(),
+                              .inferred = judged.late.CountInferred(),
                               .contradicted = judged.contradicted,
                               .unsupported = judged.unsupported});
     progress(static_cast<int>(i) + 1);

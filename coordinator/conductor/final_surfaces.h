@@ -22,6 +22,7 @@ using PutSurface = std::function<absl::StatusOr<std::string>(const std::string& 
 struct JudgedCamera {
   CameraIndex camera = 0;
   int64_t kept = 0;          // accepted when it was committed, or supported since
+  int64_t inferred = 0;      // of these, by planes around textureless holes
   int64_t contradicted = 0;  // other cameras look through it
   int64_t unsupported = 0;   // found by too few others
 };

@@ -19,10 +19,11 @@ double NumberAt(const Json& json, const char* key) {
   return found != json.end() && found->is_number() ? found->get<double>() : 0;
 }
 
-// Rays by what has become of them; they add up to `rays`.
+// Rays by what has become of them; all but `inferred` add up to `rays`.
 struct Fates {
   double rays = 0;
   double covered = 0;
+  double inferred = 0;  // of what is covered
   double blind = 0;
   double inconsistent = 0;
   double unsupported = 0;
@@ -31,6 +32,7 @@ struct Fates {
   void Add(const Fates& other) {
     rays += other.rays;
     covered += other.covered;
+    inferred += other.inferred;
     blind += other.blind;
     inconsistent += other.inconsistent;
     unsupported += other.unsupported;
@@ -40,6 +42,7 @@ struct Fates {
   Json Shares() const {
     const double all = std::max(1.0, rays);
     return {{"coverage", covered / all},
+            {"inferred", inferred / all},
             {"blind", blind / all},
             {"inconsistent", inconsistent / all},
             {"unsupported", unsupported / all},
@@ -57,6 +60,7 @@ Fates FatesOf(const Json& camera, const JudgedCamera& judged) {
     return taken;
   };
   fates.covered = take(NumberAt(camera, "rays_covered_before") + static_cast<double>(judged.kept));
+  fates.inferred = std::min(fates.covered, static_cast<double>(judged.inferred));
   fates.unsupported = take(static_cast<double>(judged.unsupported));
   fates.contradicted = take(static_cast<double>(judged.contradicted));
   fates.inconsistent = take(NumberAt(camera, "rays_grown") - NumberAt(camera, "rays_filtered"));
@@ -107,9 +111,9 @@ Json MakeVerdict(const std::vector<JudgedCamera>& judged, Json& cameras) {
 std::string DescribeVerdict(const Json& verdict) {
   const auto percent = [&](const char* key) { return 100 * NumberAt(verdict, key); };
   std::string text = absl::StrFormat(
-      "%.0f%% of the photographs covered, %.0f%% matched no other, %.0f%% inconsistent, %.0f%% confirmed by no other, "
+      "%.0f%% of the photographs covered (%.0f%% inferred), %.0f%% matched no other, %.0f%% inconsistent, %.0f%% confirmed by no other, "
       "%.0f%% contradicted",
-      percent("coverage"), percent("blind"), percent("inconsistent"), percent("unsupported"), percent("contradicted"));
+      percent("coverage"), percent("inferred"), percent("blind"), percent("inconsistent"), percent("unsupported"), percent("contradicted"));
   const auto least = verdict.find("least_covered");
   if (least != verdict.end() && least->is_object()) {
     text += absl::StrFormat("; least covered: %s, %.0f%%", (*least)["name"].get<std::string>(),

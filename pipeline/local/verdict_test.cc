@@ -31,7 +31,7 @@ TEST(Verdict, EveryRayHasOneFate) {
   Json cameras = {CameraEntry(0, 1000, 0, 600, 500), CameraEntry(1, 1000, 800, 500, 450),
                   CameraEntry(2, 1000, 300, 200, 0)};
   const Json verdict = MakeVerdict(
-      {{.camera = 0, .kept = 350, .contradicted = 50, .unsupported = 100}, {.camera = 1, .kept = 400}}, cameras);
+      {{.camera = 0, .kept = 350, .inferred = 30, .contradicted = 50, .unsupported = 100}, {.camera = 1, .kept = 400}}, cameras);
   for (const Json& camera : cameras) EXPECT_NEAR(SumOf(camera["fate"]), 1, 1e-12);
   EXPECT_NEAR(SumOf(verdict), 1, 1e-12);
   EXPECT_DOUBLE_EQ(cameras[0]["fate"]["coverage"], 0.35);
@@ -42,6 +42,8 @@ TEST(Verdict, EveryRayHasOneFate) {
   EXPECT_DOUBLE_EQ(cameras[1]["fate"]["coverage"], 1);
   EXPECT_DOUBLE_EQ(cameras[2]["fate"]["inconsistent"], 0.2);
   EXPECT_DOUBLE_EQ(verdict["coverage"], (350 + 1000 + 300) / 3000.0);
+  EXPECT_DOUBLE_EQ(cameras[0]["fate"]["inferred"], 0.03);
+  EXPECT_DOUBLE_EQ(verdict["inferred"], 0.01);
   EXPECT_EQ(verdict["least_covered"]["name"], "photograph 2");
 }
 

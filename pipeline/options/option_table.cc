@@ -95,6 +95,10 @@ std::vector<Option> MakeTable() {
       {"smoothing-radius", kFiltering, "lattice steps", 0, 8,
        "depths are then fitted to neighbours this near at most; 0 leaves them as they are",
        "larger: smoother surfaces, rounder edges", MW_FIELD(job.filtering.refinement.smoothing_radius_steps)},
+      {"infer-reach", kFiltering, "of the photograph's longer side", 0, 1,
+       "where a photograph shows no texture, the plane of the surface this near around it closes the hole; 0: none",
+       "more: larger plain walls are closed, with surface that no photograph confirms",
+       MW_FIELD(job.completion.max_reach)},
 
       {"max-surfaces", kAcceptance, "", 1, 10'000,
        "filtered surfaces of overlapping cameras that one camera is held against, the largest ones",

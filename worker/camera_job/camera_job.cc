@@ -8,6 +8,7 @@
 #include "common/base/clock.h"
 #include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
+#include "worker/completion/completion.h"
 #include "worker/filtering/epipolar_offsets.h"
 
 namespace meshwright {
@@ -37,7 +38,8 @@ absl::Status CameraJobOptions::Validate() const {
   MW_RETURN_IF_ERROR(scoring.Validate());
   MW_RETURN_IF_ERROR(seeding.Validate());
   MW_RETURN_IF_ERROR(growing.Validate());
-  return filtering.Validate();
+  MW_RETURN_IF_ERROR(filtering.Validate());
+  return completion.Validate();
 }
 
 PatchScorer MakeScorer(const CameraJobInput& input, const PatchScorer::Options& options) {
@@ -97,9 +99,12 @@ CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJo
   const EpipolarOffsets offsets = MeasureEpipolarOffsets(scorer, filtering.surface, pool);
   report.epipolar_squares = offsets.sum_of_squares;
   report.epipolar_measurements = offsets.measurements;
+
+  // Ours: planes close what photographs are blind for.
+  report.rays_inferred = CompleteSurface(scorer, input.accepted, options.completion, filtering.surface, pool);
   result.filtered =
       MakeFilteredSurface(filtering.surface, input.reference.camera_index, reference, *input.reference_color);
-  report.rays_filtered = result.filtered.CountPatches();
+  report.rays_filtered = result.filtered.CountPatches() - report.rays_inferred;
   report.seconds_refinement = timer.Lap();
   return result;
 }

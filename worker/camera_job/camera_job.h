@@ -18,6 +18,7 @@
 #include "common/image/color_image.h"
 #include "common/image/sampling_image.h"
 #include "common/surface/patch_lattice.h"
+#include "worker/completion/completion.h"
 #include "worker/filtering/filtering.h"
 #include "worker/growing/growing.h"
 #include "worker/seeding/seeding.h"
@@ -32,6 +33,7 @@ struct CameraJobOptions {
   SeedingOptions seeding;
   GrowingOptions growing;
   FilteringOptions filtering;
+  CompletionOptions completion;
 
   absl::Status Validate() const;
 };
@@ -65,7 +67,8 @@ struct CameraJobReport {
   int64_t tentative_patches_scored = 0;
   int64_t patches_grown = 0;
   int64_t rays_grown = 0;       // rays with at least one grown patch
-  int64_t rays_filtered = 0;    // rays with a patch in F_r
+  int64_t rays_filtered = 0;    // rays with a patch that filtering left
+  int64_t rays_inferred = 0;    // rays that got their patch from the plane around them: F_r has both
   double epipolar_squares = 0;  // of offsets across epipolar lines, px^2 summed over epipolar_measurements
   int64_t epipolar_measurements = 0;
   double mrf_energy = 0;
@@ -74,7 +77,7 @@ struct CameraJobReport {
   double seconds_seeding = 0;     // wall
   double seconds_growing = 0;
   double seconds_filtering = 0;
-  double seconds_refinement = 0;
+  double seconds_refinement = 0;  // and completion
 };
 
 struct CameraJobResult {
@@ -83,7 +86,8 @@ struct CameraJobResult {
   CameraJobReport report;
 };
 
-// One reference camera, as sections 3.5 to 3.7 of Jancosek et al. 2009 read: seeds, growing, filtering. The result
+// One reference camera, as sections 3.5 to 3.7 of Jancosek et al. 2009 read: seeds, growing, filtering; and what planes
+// around textureless holes say (ours). The result
 // depends on input and options alone, not on the number of threads in `pool`.
 CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool);
 

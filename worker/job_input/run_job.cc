@@ -40,6 +40,7 @@ Json MakeJobReport(const Scene& scene, const CameraJobSpec& spec, const CameraJo
   json["rays_covered_before"] = report.rays_covered_before;
   json["rays_grown"] = report.rays_grown;
   json["rays_filtered"] = report.rays_filtered;
+  json["rays_inferred"] = report.rays_inferred;
   json["epipolar_squares"] = report.epipolar_squares;
   json["epipolar_measurements"] = report.epipolar_measurements;
   json["mrf_energy"] = report.mrf_energy;

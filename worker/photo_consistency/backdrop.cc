@@ -10,8 +10,6 @@ namespace {
 // A border is dark when this share of it is no brighter than that, grey levels. The object may reach the border.
 constexpr double kDarkShareOfBorder = 0.9;
 constexpr int kDarkBorder = 32;
-// Folds of a cloth catch light: the backdrop goes on up to here, grey levels.
-constexpr int kDark = 48;
 // Bright specks in the backdrop up to this share of the photograph belong to it.
 constexpr double kSpeckShare = 5e-4;
 

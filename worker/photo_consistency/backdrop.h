@@ -23,8 +23,13 @@ class Backdrop {
     const int row = y / 2 < rows_ ? y / 2 : rows_ - 1;
     return covered_[static_cast<size_t>(row) * static_cast<size_t>(columns_) + static_cast<size_t>(column)] != 0;
   }
+  // Whether there is a backdrop and this grey level is as dark: it may be a piece of it that the object surrounds.
+  bool MayBe(int grey) const { return !covered_.empty() && grey <= kDark; }
 
  private:
+  // Folds of a cloth catch light: the backdrop goes on up to here, grey levels.
+  static constexpr int kDark = 48;
+
   int columns_ = 0;  // of blocks of 2 x 2 px
   int rows_ = 0;
   std::vector<uint8_t> covered_;  // empty: no backdrop

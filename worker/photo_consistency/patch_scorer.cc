@@ -99,12 +99,15 @@ bool PatchScorer::SetRange(int x, int y, Window& window) const {
 void PatchScorer::MakeWindow(int x, int y, Window& window) const {
   const int radius = options_.window_radius;
   const SamplingImage& image = *reference_.grey;
+  window.may_hold_surface = false;
+  window.may_show_backdrop = false;
   window.usable = false;
   window.sigma = 0;
   if (x < radius || y < radius || x + radius >= image.width() || y + radius >= image.height()) return;
   if (backdrop_.Covers(x, y)) return;
   const IgnoredPixels& ignored = image.ignored();
   if (ignored.At(x, y) || !SetRange(x, y, window)) return;
+  window.may_hold_surface = true;
   const bool has_ignored = ignored.AnyIn(x - radius, y - radius, x + radius, y + radius);
   const SamplingImage::Level& level = image.level(0);
   int sum = 0;
@@ -120,6 +123,7 @@ void PatchScorer::MakeWindow(int x, int y, Window& window) const {
       window.values[k++] = static_cast<float>(value);
     }
   }
+  window.may_show_backdrop = backdrop_.MayBe(static_cast<int>(window.values[samples_ / 2]));
   const auto n = static_cast<float>(samples_);
   // Integers up to here: exact.
   const float variance =

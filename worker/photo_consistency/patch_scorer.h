@@ -78,7 +78,9 @@ class PatchScorer {
     float sigma = 0;     // grey levels
     float min_w = 0;     // inverse depths that the region has on the centre's ray, 1 / scene units
     float max_w = 0;
-    bool usable = false;  // inside the image and the region, its centre not ignored, textured, not of a black backdrop
+    bool may_hold_surface = false;   // inside the image and the region, its centre not ignored, not of a black backdrop
+    bool may_show_backdrop = false;  // as dark as the black backdrop that this photograph has
+    bool usable = false;             // may hold surface and is textured
   };
   void MakeWindow(int x, int y, Window& window) const;
 
