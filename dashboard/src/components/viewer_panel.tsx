@@ -126,7 +126,7 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
         parts: loading.parts.size,
         faces: loading.facesOfWhole,
         shown: made.shownFaces,
-        complete: loading.complete,
+        complete: loading.complete && made.upToDate,
         region: made.surfaceRegion,
       });
     }, 250);

@@ -183,6 +183,11 @@ export class SceneViewer {
   }
 
   // What the surface fills; null while there is none.
+  // Whether all that it was told to show is there.
+  get upToDate(): boolean {
+    return this.queue.length === 0;
+  }
+
   get surfaceRegion(): Region | null {
     const { min, max } = this.partBox;
     return this.partBox.isEmpty() ? null : [min.x, min.y, min.z, max.x, max.y, max.z];
