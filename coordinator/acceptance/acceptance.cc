@@ -32,8 +32,8 @@ class SupportIndex {
     for (int row = 0; row < lattice.rows; ++row) ray_y_.push_back(camera.RayInCam(0, lattice.PixelY(row) + 0.5).y());
   }
 
-  // Whether the supporter looks through the point: it has measured a surface more than `clearance` behind it on all four
-  // rays around it.
+  // Whether the supporter looks through the point: it has measured a surface more than `clearance` behind it on all
+  // four rays around it.
   bool SeesThrough(const Eigen::Vector3d& x_in_cam, double clearance) const {
     if (x_in_cam.z() <= clearance) return false;
     const Lattice& lattice = surface_.lattice;

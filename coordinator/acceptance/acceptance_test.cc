@@ -196,7 +196,8 @@ TEST(Acceptance, InferredPatchesHaveNoSayAboutMeasuredOnes) {
 
   const std::vector<PatchLattice> inferred = {as_camera(inferred_wall, 1)};
   const std::vector<PatchLattice> measured = {as_camera(wall, 1)};
-  EXPECT_EQ(AcceptSurface(wall, 1, LoaderOf(inferred), {}, pool)->patches_accepted, 0) << "no support for a measured one";
+  EXPECT_EQ(AcceptSurface(wall, 1, LoaderOf(inferred), {}, pool)->patches_accepted, 0)
+      << "no support for a measured one";
   EXPECT_EQ(AcceptSurface(inferred_wall, 1, LoaderOf(measured), {}, pool)->patches_accepted, 0) << "not yet";
   for (const auto& supporters : {inferred, measured}) {
     const auto judged = JudgeAgain(inferred_wall, nothing, 1, LoaderOf(supporters), {}, pool);

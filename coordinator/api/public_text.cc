@@ -35,4 +35,3 @@ std::string WithoutServerPaths(const std::string& text) {
 }
 
 }  // namespace meshwright
-

@@ -10,4 +10,3 @@ namespace meshwright {
 std::string WithoutServerPaths(const std::string& text);
 
 }  // namespace meshwright
-

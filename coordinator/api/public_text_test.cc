@@ -22,4 +22,3 @@ TEST(PublicTextTest, TellsNothingOfTheServersFolders) {
 
 }  // namespace
 }  // namespace meshwright
-

@@ -41,12 +41,9 @@ struct Fates {
 
   Json Shares() const {
     const double all = std::max(1.0, rays);
-    return {{"coverage", covered / all},
-            {"inferred", inferred / all},
-            {"blind", blind / all},
-            {"inconsistent", inconsistent / all},
-            {"unsupported", unsupported / all},
-            {"contradicted", contradicted / all}};
+    return {
+        {"coverage", covered / all},          {"inferred", inferred / all},       {"blind", blind / all},
+        {"inconsistent", inconsistent / all}, {"unsupported", unsupported / all}, {"contradicted", contradicted / all}};
   }
 };
 
@@ -111,9 +108,11 @@ Json MakeVerdict(const std::vector<JudgedCamera>& judged, Json& cameras) {
 std::string DescribeVerdict(const Json& verdict) {
   const auto percent = [&](const char* key) { return 100 * NumberAt(verdict, key); };
   std::string text = absl::StrFormat(
-      "%.0f%% of the photographs covered (%.0f%% inferred), %.0f%% matched no other, %.0f%% inconsistent, %.0f%% confirmed by no other, "
+      "%.0f%% of the photographs covered (%.0f%% inferred), %.0f%% matched no other, %.0f%% inconsistent, %.0f%% "
+      "confirmed by no other, "
       "%.0f%% contradicted",
-      percent("coverage"), percent("inferred"), percent("blind"), percent("inconsistent"), percent("unsupported"), percent("contradicted"));
+      percent("coverage"), percent("inferred"), percent("blind"), percent("inconsistent"), percent("unsupported"),
+      percent("contradicted"));
   const auto least = verdict.find("least_covered");
   if (least != verdict.end() && least->is_object()) {
     text += absl::StrFormat("; least covered: %s, %.0f%%", (*least)["name"].get<std::string>(),

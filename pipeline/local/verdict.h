@@ -18,10 +18,9 @@ inline constexpr double kCamerasOffPx = 0.2;
 // of its rays ("fate", shares of them), and how far its picture and those of its targets lie apart across epipolar
 // lines
 // ("off_px", null where too little was measured). Gives
-// {"coverage", "inferred", "blind", "inconsistent", "unsupported", "contradicted", "least_covered", "cameras_off_px"}, the
-// shares over the rays of all processed cameras:
-// coverage: shows surface that was there before or that this camera found and others confirm; inferred: of that, what
-// only the planes around textureless holes say; blind: nothing there
+// {"coverage", "inferred", "blind", "inconsistent", "unsupported", "contradicted", "least_covered", "cameras_off_px"},
+// the shares over the rays of all processed cameras: coverage: shows surface that was there before or that this camera
+// found and others confirm; inferred: of that, what only the planes around textureless holes say; blind: nothing there
 // looked alike in other photographs; inconsistent: what grew there did not hold together; unsupported: no other
 // camera found the same; contradicted: as many look through it.
 nlohmann::ordered_json MakeVerdict(const std::vector<JudgedCamera>& judged, nlohmann::ordered_json& cameras);

@@ -31,7 +31,8 @@ TEST(Verdict, EveryRayHasOneFate) {
   Json cameras = {CameraEntry(0, 1000, 0, 600, 500), CameraEntry(1, 1000, 800, 500, 450),
                   CameraEntry(2, 1000, 300, 200, 0)};
   const Json verdict = MakeVerdict(
-      {{.camera = 0, .kept = 350, .inferred = 30, .contradicted = 50, .unsupported = 100}, {.camera = 1, .kept = 400}}, cameras);
+      {{.camera = 0, .kept = 350, .inferred = 30, .contradicted = 50, .unsupported = 100}, {.camera = 1, .kept = 400}},
+      cameras);
   for (const Json& camera : cameras) EXPECT_NEAR(SumOf(camera["fate"]), 1, 1e-12);
   EXPECT_NEAR(SumOf(verdict), 1, 1e-12);
   EXPECT_DOUBLE_EQ(cameras[0]["fate"]["coverage"], 0.35);

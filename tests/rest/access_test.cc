@@ -326,4 +326,3 @@ TEST_F(AccessOverTheNetworkTest, WhatOthersReachAsksForKeys) {
 
 }  // namespace
 }  // namespace meshwright
-

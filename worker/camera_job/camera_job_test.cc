@@ -159,7 +159,8 @@ TEST_F(CameraJobTest, TheReportAddsUp) {
   EXPECT_EQ(report.rays_grown, grown.CountRays());
   EXPECT_LE(report.rays_grown, report.patches_grown);
   EXPECT_LE(report.rays_filtered, report.rays_grown);
-  EXPECT_EQ(report.rays_filtered, result.filtered.CountPatches());
+  EXPECT_EQ(report.rays_inferred, result.filtered.CountInferred());
+  EXPECT_EQ(report.rays_filtered + report.rays_inferred, result.filtered.CountPatches());
   EXPECT_GE(report.tentative_patches_scored, report.patches_grown - report.seeds);
   EXPECT_LE(report.mrf_lower_bound, report.mrf_energy + 1e-6 * std::fabs(report.mrf_energy));
   EXPECT_LE(report.mrf_energy, FilteringOptions{}.no_patch_cost * static_cast<double>(report.rays))

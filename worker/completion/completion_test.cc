@@ -27,7 +27,8 @@ class CompleteSurfaceTest : public testing::Test {
         lattice_(Lattice::For(camera_, kStep)),
         grey_{.width = camera_.width,
               .height = camera_.height,
-              .grey = std::vector<uint8_t>(static_cast<size_t>(camera_.width) * static_cast<size_t>(camera_.height), 120)},
+              .grey =
+                  std::vector<uint8_t>(static_cast<size_t>(camera_.width) * static_cast<size_t>(camera_.height), 120)},
         surface_(lattice_),
         accepted_(AcceptedDepth::Empty(camera_, kStep)) {
     for (int row = 0; row < lattice_.rows; ++row) {
