@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 
 #include "common/base/check.h"
+#include "common/mesh/loop_triangulation.h"
 
 namespace meshwright {
 namespace {
@@ -25,6 +26,8 @@ constexpr double kSlitWidth = 6;
 constexpr double kMinSlitCosine = 0.05;
 // So many of a wider hole's rim vertices must lie near its plane.
 constexpr double kMinFlatShare = 0.9;
+// What is left of a hole is closed at once when it has no more corners; in a larger one the rims are too wild.
+constexpr size_t kMaxLoopCorners = 60;
 // Vertices whose normals differ more belong to another sheet.
 constexpr double kMinSheetCosine = 0.5;
 
@@ -400,6 +403,7 @@ void BorderStitcher::StitchNearby(double reach, ThreadPool& pool, const std::fun
 struct BorderStitcher::Hole {
   Eigen::Vector3d center, normal;
   double radius = 0;
+  bool has_islands = false;
   std::vector<int32_t> corners;
 };
 
@@ -467,10 +471,66 @@ std::vector<BorderStitcher::Hole> BorderStitcher::FindHoles(double max_width) co
       }
     }
     if (around == holes.size()) continue;
+    holes[around].has_islands = true;
     std::vector<int32_t>& corners = holes[around].corners;
     corners.insert(corners.end(), island.corners.begin(), island.corners.end());
   }
   return holes;
+}
+
+// The loop of gaps from one corner on, or nothing when it is longer than kMaxLoopCorners. A loop that comes to a vertex
+// again is cut in two there, and the first part that does not is given.
+std::vector<int32_t> BorderStitcher::CutSimpleLoop(int32_t first) {
+  std::vector<int32_t> loop;
+  absl::flat_hash_map<int32_t, size_t> place;  // of vertices in the loop
+  int32_t corner = first;
+  do {
+    const auto [met, is_new] = place.try_emplace(VertexOf(corner), loop.size());
+    if (!is_new) {
+      loop.erase(loop.begin(), loop.begin() + static_cast<std::ptrdiff_t>(met->second));
+      const int32_t before = At(loop.front()).previous;
+      At(before).next = corner;
+      At(corner).previous = before;
+      At(loop.back()).next = loop.front();
+      At(loop.front()).previous = loop.back();
+      return loop;
+    }
+    if (loop.size() == kMaxLoopCorners) return {};
+    loop.push_back(corner);
+    corner = At(corner).next;
+  } while (corner != first);
+  return loop;
+}
+
+// Closes the loops that are left of a hole, each as a whole: rims that fold over in the hole's plane stop an advancing
+// front.
+void BorderStitcher::CloseLoops(absl::Span<const int32_t> corners) {
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<Eigen::Vector3d> normals;
+  absl::flat_hash_set<int32_t> given_up;
+  for (const int32_t first : corners) {
+    while (At(first).open && !given_up.contains(first)) {
+      const std::vector<int32_t> loop = CutSimpleLoop(first);
+      if (loop.size() < 3) break;
+      positions.clear();
+      normals.clear();
+      for (const int32_t corner : loop) {
+        positions.push_back(Position(VertexOf(corner)));
+        normals.push_back(Normal(VertexOf(corner)));
+      }
+      const auto vertex = [&](int32_t i) { return VertexOf(loop[static_cast<size_t>(i)]); };
+      const std::vector<Face> triangles =
+          TriangulateLoop(positions, normals, [&](int32_t i, int32_t j) { return !HasEdge(vertex(i), vertex(j)); });
+      if (triangles.empty()) given_up.insert(loop.begin(), loop.end());
+      for (const Face& triangle : triangles) {
+        faces_.push_back({vertex(triangle[0]), vertex(triangle[1]), vertex(triangle[2])});
+        for (size_t k = 0; k < 3; ++k) AddEdge(vertex(triangle[k]), vertex(triangle[(k + 1) % 3]));
+      }
+      if (!triangles.empty()) {
+        for (const int32_t corner : loop) Close(At(corner));
+      }
+    }
+  }
 }
 
 int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>& step) {
@@ -494,6 +554,7 @@ int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>&
       candidates.push_back(At(edge).open ? BestNow(edge, scope) : Candidate());
     }
     Advance(hole.corners, scope, candidates, [](double) {});
+    if (!hole.has_islands) CloseLoops(hole.corners);
   }
   filling.Reach(1);
   return std::ranges::count_if(holes, [&](const Hole& hole) {

@@ -124,6 +124,8 @@ class BorderStitcher {
   void MakeGrid(int level);
   void FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found);
   std::vector<Hole> FindHoles(double max_width) const;
+  std::vector<int32_t> CutSimpleLoop(int32_t first);
+  void CloseLoops(absl::Span<const int32_t> corners);
 
   Corner& At(int32_t corner) { return corners_[static_cast<size_t>(corner)]; }
   const Corner& At(int32_t corner) const { return corners_[static_cast<size_t>(corner)]; }
