@@ -3,6 +3,6 @@
 
 namespace meshwright {
 
-const int kMethodVersion = 3;
+const int kMethodVersion = 4;
 
 }  // namespace meshwright

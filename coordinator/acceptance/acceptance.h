@@ -50,7 +50,8 @@ using SurfaceLoader = std::function<absl::StatusOr<std::shared_ptr<const SparseS
 absl::StatusOr<AcceptanceResult> AcceptSurface(const PatchLattice& filtered, int supporters, const SurfaceLoader& load,
                                                const AcceptanceOptions& options, ThreadPool& pool);
 
-// What a filtered surface comes to once every camera is committed.
+// What a filtered surface comes to once every camera is committed. Its patches lie where all cameras that see them have
+// measured them on average.
 struct FinalSurface {
   PatchLattice kept;  // M_r less the patches that as many cameras look through as support
   PatchLattice late;  // what of F_r is not in M_r and has found its supporters since, or was inferred by them as well
@@ -63,6 +64,11 @@ struct FinalSurface {
 // what only they support (all that the first camera of a place saw) was not accepted at all. `supporters` are now all
 // that overlap r, `accepted` is M_r. The late patches repeat much of what later cameras were given anyway: they belong
 // behind all accepted surfaces, to close gaps.
+//
+// Each patch moves along its ray to the weighted mean of its own depth and of those at which the supporters' patches
+// meet the ray: a weight falls to nothing at the radius of support, and with the square of a supporter's d_s(X) /
+// d_r(X). Cameras that are a little wrong, and noise, move each surface in its own way; so parts come to lie on each
+// other.
 absl::StatusOr<FinalSurface> JudgeAgain(const PatchLattice& filtered, const PatchLattice& accepted, int supporters,
                                         const SurfaceLoader& load, const AcceptanceOptions& options, ThreadPool& pool);
 

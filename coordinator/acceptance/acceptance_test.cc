@@ -217,6 +217,86 @@ TEST(Acceptance, InferredPatchesHaveNoSayAboutMeasuredOnes) {
   EXPECT_LE(JudgeAgain(inferred_floating, nothing, 2, LoaderOf(one_against_it), {}, pool)->late.CountPatches(), rim);
 }
 
+// A linked wall z = 10 that each of several cameras measured with noise of its own.
+class MeasuredWalls {
+ public:
+  MeasuredWalls(double noise_d_r, std::mt19937& generator) {
+    std::normal_distribution<double> noise(0, noise_d_r);
+    for (int i = 0; i < 6; ++i) {
+      PatchLattice wall = RandomSurface(i, CameraAt({0.4 * i - 1, 0.1 * i, 0}, 0, 40), 1, 0, generator);
+      for (int64_t node = 0; node < wall.lattice.nodes(); ++node) {
+        if (!wall.HasPatch(node)) continue;
+        float& depth = wall.depth[static_cast<size_t>(node)];
+        depth += static_cast<float>(noise(generator) * LevelOfDetail(wall.camera, depth, 1));
+      }
+      walls_.push_back(wall);
+    }
+  }
+
+  std::vector<PatchLattice>& walls() { return walls_; }
+
+  FinalSurface JudgeFirst(int threads = 2) const {
+    ThreadPool pool(threads);
+    const std::vector<PatchLattice> others(walls_.begin() + 1, walls_.end());
+    const PatchLattice nothing = PatchLattice::Empty(0, walls_[0].camera, 1);
+    return JudgeAgain(walls_[0], nothing, static_cast<int>(others.size()), LoaderOf(others), {}, pool).value();
+  }
+
+  // Root mean square of distances from the wall, of patches that `like` has too.
+  static double RmsOff(const PatchLattice& surface, const PatchLattice& like) {
+    double sum = 0;
+    int64_t count = 0;
+    for (int row = 0; row < surface.lattice.rows; ++row) {
+      for (int column = 0; column < surface.lattice.columns; ++column) {
+        if (!like.HasPatch(like.lattice.Index(column, row))) continue;
+        const double off = surface.Point(column, row).z() - 10;
+        sum += off * off;
+        ++count;
+      }
+    }
+    return std::sqrt(sum / static_cast<double>(count));
+  }
+
+ private:
+  std::vector<PatchLattice> walls_;
+};
+
+// Judged again a patch lies where all cameras measured it on average, so noise becomes less; what all agree on stays.
+TEST(Acceptance, JudgedAgainPatchesLieWhereCamerasMeasuredThemOnAverage) {
+  std::mt19937 generator(8);
+  MeasuredWalls noisy(0.5, generator);
+  const FinalSurface judged = noisy.JudgeFirst();
+  EXPECT_GT(judged.late.CountPatches(), 500);
+  EXPECT_LT(MeasuredWalls::RmsOff(judged.late, judged.late),
+            0.6 * MeasuredWalls::RmsOff(noisy.walls()[0], judged.late));
+  const FinalSurface one_thread = noisy.JudgeFirst(1);
+  EXPECT_EQ(one_thread.late.depth, judged.late.depth);
+
+  MeasuredWalls exact(0, generator);
+  EXPECT_LT(MeasuredWalls::RmsOff(exact.JudgeFirst().late, exact.JudgeFirst().late), 1e-4);
+}
+
+TEST(Acceptance, NoPatchMovesToAnotherSurfaceOrToWhatWasInferred) {
+  std::mt19937 generator(9);
+  MeasuredWalls exact(0, generator);
+  // The others' second surface lies 4 d_r behind; one camera stays, as the supporter without which nothing is kept.
+  for (size_t i = 2; i < exact.walls().size(); ++i) {
+    for (float& depth : exact.walls()[i].depth) depth *= 1 + 4.0F / 40;
+  }
+  const FinalSurface before_another = exact.JudgeFirst();
+  EXPECT_GT(before_another.late.CountPatches(), 500);
+  EXPECT_LT(MeasuredWalls::RmsOff(before_another.late, before_another.late), 1e-4);
+
+  MeasuredWalls inferred(0, generator);
+  for (size_t i = 2; i < inferred.walls().size(); ++i) {
+    for (float& depth : inferred.walls()[i].depth) depth *= 1 + 1.0F / 40;
+    std::fill(inferred.walls()[i].quality.begin(), inferred.walls()[i].quality.end(), PatchLattice::kInferredQuality);
+  }
+  const FinalSurface before_inferred = inferred.JudgeFirst();
+  EXPECT_GT(before_inferred.late.CountPatches(), 500);
+  EXPECT_LT(MeasuredWalls::RmsOff(before_inferred.late, before_inferred.late), 1e-4);
+}
+
 TEST(Acceptance, LinksStayWhereBothEndsDo) {
   std::mt19937 generator(2);
   ThreadPool pool(2);
