@@ -206,8 +206,9 @@ TEST_P(FarFromZeroTest, EveryFormatHasTheMeshOfNearToAThousandthOfAPixel) {
     }
     const std::vector<Eigen::Vector3d> positions = read(path);
     ASSERT_FALSE(positions.empty());
-    // Poses that were written far from zero differ in their last digits, and some patches settle elsewhere.
-    const double few = 0.05 * static_cast<double>(expected.size());
+    // Poses that were written far from zero differ in their last digits, and some patches settle elsewhere; so do, by a
+    // little, those of other cameras that are averaged with them.
+    const double few = 0.08 * static_cast<double>(expected.size());
     EXPECT_LE(CountFarther(positions, expected, tolerance), few);
     EXPECT_LE(CountFarther(expected, positions, tolerance), few);
     // Nothing is lost on the way from the PLY.
