@@ -45,8 +45,8 @@ uint8_t OneMore(uint8_t count) { return count < 255 ? static_cast<uint8_t>(count
 
 // How far a patch moves along its ray so that it lies where all cameras measured it on average.
 struct Move {
-  double sum = 0;     // weighted, in scene units of depth
-  double weight = 0;  // of the other cameras; the patch itself has 1
+  float sum = 0;     // weighted, in scene units of depth
+  float weight = 0;  // of the other cameras; the patch itself has 1
 };
 
 // Calls body(node, x, direction, radius, coarseness) for each patch: its centre and the direction of its ray for a unit
@@ -103,8 +103,8 @@ void AddMoves(const PatchLattice& filtered, const SupportIndex& supporter, const
         const double likeness = (1 - share * share) * (1 - share * share);
         const double fineness = std::min(kMaxFineness, 1 / coarseness);
         const double weight = fineness * fineness * likeness;
-        moves[node].sum += weight * *distance;
-        moves[node].weight += weight;
+        moves[node].sum += static_cast<float>(weight * *distance);
+        moves[node].weight += static_cast<float>(weight);
       });
 }
 
@@ -190,7 +190,7 @@ absl::StatusOr<FinalSurface> JudgeAgain(const PatchLattice& filtered, const Patc
     if (!stays || accepted.HasPatch(index)) ClearNode(index, surface.late);
   }
   for (size_t node = 0; node < moves.size(); ++node) {
-    const auto move = static_cast<float>(moves[node].sum / (1 + moves[node].weight));
+    const float move = moves[node].sum / (1 + moves[node].weight);
     if (surface.kept.depth[node] > 0) surface.kept.depth[node] += move;
     if (surface.late.depth[node] > 0) surface.late.depth[node] += move;
   }
