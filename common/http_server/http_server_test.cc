@@ -33,7 +33,7 @@ using testing::StartsWith;
 const std::string kHost = "Host: x\r\n";
 
 // MiB of what is freed.
-#ifdef __SANITIZE_ADDRESS__
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr double kKeptByTheSanitizer = 448;
 #else
 constexpr double kKeptByTheSanitizer = 0;
