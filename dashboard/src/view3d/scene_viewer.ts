@@ -132,7 +132,8 @@ export class SceneViewer {
     if (table.count === 0) return;
     if (first) this.takeUpCameras(table);
     this.frusta.set(table, this.cameraSpacing(table));
-    if (first) this.fit();
+    // Cameras may come when somebody looks at the first surface already.
+    if (first && !this.movedByHand) this.fit();
     this.draw();
   }
 
