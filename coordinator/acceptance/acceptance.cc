@@ -49,12 +49,27 @@ struct Move {
   float weight = 0;  // of the other cameras; the patch itself has 1
 };
 
-// Calls body(node, x, direction, radius, coarseness) for each patch: its centre and the direction of its ray for a unit
-// of depth, both in the supporter's frame, the radius of the ball in which the two agree, and the supporter's d_s(X)
-// over d_r(X).
-template <typename Body>
-void ForEachPatch(const PatchLattice& filtered, const SparseSurface& supporter, const AcceptanceOptions& options,
-                  ThreadPool& pool, const Body& body) {
+// Adds where the supporter measured a patch. Its weight falls with its distance, so that nothing jumps where the
+// supporter sees another surface, and with the square of its spacing. `direction`: of the patch's ray, for a unit of
+// depth; `coarseness`: d_s(X) over d_r(X).
+void AddTo(Move& move, const SupportIndex& supporter, const Eigen::Vector3d& x_in_supporter,
+           const Eigen::Vector3d& direction_in_supporter, double radius, double coarseness) {
+  const std::optional<double> distance = supporter.DistanceAlong(x_in_supporter, direction_in_supporter, radius);
+  if (!distance.has_value()) return;
+  const double share = *distance / radius;
+  const double likeness = (1 - share * share) * (1 - share * share);
+  const double fineness = std::min(kMaxFineness, 1 / coarseness);
+  const double weight = fineness * fineness * likeness;
+  move.sum += static_cast<float>(weight * *distance);
+  move.weight += static_cast<float>(weight);
+}
+
+// Adds one supporter's votes on what is still open, where `remaining` cameras vote, this one included; and, unless
+// `moves` is null, where it measured each patch.
+void CountVotesAndMoves(const PatchLattice& filtered, const SupportIndex& index, int remaining,
+                        const AcceptanceOptions& options, std::vector<Votes>& votes, std::vector<Move>* moves,
+                        ThreadPool& pool) {
+  const SparseSurface& supporter = index.surface();
   const Camera& reference = filtered.camera;
   const Rigid3 supporter_from_reference = supporter.camera.cam_from_world * Inverse(reference.cam_from_world);
   const Lattice& lattice = filtered.lattice;
@@ -63,49 +78,28 @@ void ForEachPatch(const PatchLattice& filtered, const SparseSurface& supporter, 
       for (int column = 0; column < lattice.columns; ++column) {
         const auto node = static_cast<size_t>(lattice.Index(column, row));
         if (!(filtered.depth[node] > 0)) continue;
+        const bool is_open = IsOpen(votes[node], remaining, options);
+        if (!is_open && moves == nullptr) continue;
         const double z = filtered.depth[node];
         const Eigen::Vector3d ray = reference.RayInCam(lattice.PixelX(column) + 0.5, lattice.PixelY(row) + 0.5);
         const Eigen::Vector3d x_in_supporter = supporter_from_reference * (z * ray);
         const double detail = LevelOfDetail(reference, z, lattice.step);
         const double coarser = LevelOfDetail(supporter.camera, x_in_supporter.z(), supporter.lattice.step);
-        body(node, x_in_supporter, supporter_from_reference.rotation * ray,
-             options.support_radius_steps * std::max(detail, std::min(coarser, kMaxCoarseness * detail)),
-             coarser / detail);
+        const double radius =
+            options.support_radius_steps * std::max(detail, std::min(coarser, kMaxCoarseness * detail));
+        if (moves != nullptr) {
+          AddTo((*moves)[node], index, x_in_supporter, supporter_from_reference.rotation * ray, radius,
+                coarser / detail);
+        }
+        if (!is_open) continue;
+        if (index.HasPatchNear(x_in_supporter, radius, filtered.IsInferred(static_cast<int64_t>(node)))) {
+          votes[node].support = OneMore(votes[node].support);
+        } else if (index.SeesThrough(x_in_supporter, kClearanceInRadii * radius)) {
+          votes[node].conflicts = OneMore(votes[node].conflicts);
+        }
       }
     }
   });
-}
-
-// Adds one supporter's votes on what is still open; `remaining` cameras vote, this one included.
-void CountVotes(const PatchLattice& filtered, const SupportIndex& supporter, int remaining,
-                const AcceptanceOptions& options, std::vector<Votes>& votes, ThreadPool& pool) {
-  ForEachPatch(filtered, supporter.surface(), options, pool,
-               [&](size_t node, const Eigen::Vector3d& x, const Eigen::Vector3d&, double radius, double) {
-                 if (!IsOpen(votes[node], remaining, options)) return;
-                 if (supporter.HasPatchNear(x, radius, filtered.IsInferred(static_cast<int64_t>(node)))) {
-                   votes[node].support = OneMore(votes[node].support);
-                 } else if (supporter.SeesThrough(x, kClearanceInRadii * radius)) {
-                   votes[node].conflicts = OneMore(votes[node].conflicts);
-                 }
-               });
-}
-
-// Adds where one supporter measured the patches. Its weight falls with its distance, so that nothing jumps where the
-// supporter sees another surface, and with the square of its spacing.
-void AddMoves(const PatchLattice& filtered, const SupportIndex& supporter, const AcceptanceOptions& options,
-              std::vector<Move>& moves, ThreadPool& pool) {
-  ForEachPatch(
-      filtered, supporter.surface(), options, pool,
-      [&](size_t node, const Eigen::Vector3d& x, const Eigen::Vector3d& direction, double radius, double coarseness) {
-        const std::optional<double> distance = supporter.DistanceAlong(x, direction, radius);
-        if (!distance.has_value()) return;
-        const double share = *distance / radius;
-        const double likeness = (1 - share * share) * (1 - share * share);
-        const double fineness = std::min(kMaxFineness, 1 / coarseness);
-        const double weight = fineness * fineness * likeness;
-        moves[node].sum += static_cast<float>(weight * *distance);
-        moves[node].weight += static_cast<float>(weight);
-      });
 }
 
 // `moves`: null when nobody wants to know.
@@ -116,9 +110,7 @@ absl::StatusOr<std::vector<Votes>> CollectVotes(const PatchLattice& filtered, in
   for (int i = 0; i < supporters; ++i) {
     MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> supporter, load(i));
     MW_CHECK(supporter != nullptr && supporter->camera_index != filtered.camera_index);
-    const SupportIndex index(*supporter);
-    CountVotes(filtered, index, supporters - i, options, votes, pool);
-    if (moves != nullptr) AddMoves(filtered, index, options, *moves, pool);
+    CountVotesAndMoves(filtered, SupportIndex(*supporter), supporters - i, options, votes, moves, pool);
   }
   return votes;
 }

@@ -53,6 +53,23 @@ PatchLattice RandomSurface(CameraIndex index, const Camera& camera, int step, do
   return surface;
 }
 
+PatchLattice AtDepth(PatchLattice surface, float depth) {
+  std::fill(surface.depth.begin(), surface.depth.end(), depth);
+  return surface;
+}
+
+PatchLattice AsCamera(PatchLattice surface, CameraIndex index) {
+  surface.camera_index = index;
+  return surface;
+}
+
+// A patch on each ray, all at one depth.
+PatchLattice FullSurface(const Camera& camera, float depth, std::mt19937& generator) {
+  PatchLattice surface = AtDepth(RandomSurface(0, camera, 1, 0, generator), depth);
+  std::fill(surface.quality.begin(), surface.quality.end(), 0.9F);
+  return surface;
+}
+
 SurfaceLoader LoaderOf(const std::vector<PatchLattice>& surfaces) {
   return [&surfaces](int i) -> absl::StatusOr<std::shared_ptr<const SparseSurface>> {
     return std::make_shared<const SparseSurface>(SparseSurface::From(surfaces[static_cast<size_t>(i)]));
@@ -179,23 +196,16 @@ TEST(Acceptance, InferredPatchesHaveNoSayAboutMeasuredOnes) {
   std::mt19937 generator(7);
   ThreadPool pool(2);
   const Camera camera = CameraAt({0, 0, 0}, 0, 40);
-  PatchLattice wall = RandomSurface(0, camera, 1, 0, generator);
-  std::fill(wall.depth.begin(), wall.depth.end(), 10.0F);
-  std::fill(wall.quality.begin(), wall.quality.end(), 0.9F);
+  const PatchLattice wall = FullSurface(camera, 10, generator);
   PatchLattice inferred_wall = wall;
   std::fill(inferred_wall.quality.begin(), inferred_wall.quality.end(), PatchLattice::kInferredQuality);
-  PatchLattice floating = wall;
-  std::fill(floating.depth.begin(), floating.depth.end(), 5.0F);
+  const PatchLattice floating = AtDepth(wall, 5);
   const PatchLattice nothing = PatchLattice::Empty(0, camera, 1);
-  const auto as_camera = [](PatchLattice surface, CameraIndex index) {
-    surface.camera_index = index;
-    return surface;
-  };
   const int64_t all = wall.CountPatches();
   const int64_t rim = 2 * (wall.lattice.columns + wall.lattice.rows);
 
-  const std::vector<PatchLattice> inferred = {as_camera(inferred_wall, 1)};
-  const std::vector<PatchLattice> measured = {as_camera(wall, 1)};
+  const std::vector<PatchLattice> inferred = {AsCamera(inferred_wall, 1)};
+  const std::vector<PatchLattice> measured = {AsCamera(wall, 1)};
   EXPECT_EQ(AcceptSurface(wall, 1, LoaderOf(inferred), {}, pool)->patches_accepted, 0)
       << "no support for a measured one";
   EXPECT_EQ(AcceptSurface(inferred_wall, 1, LoaderOf(measured), {}, pool)->patches_accepted, 0) << "not yet";
@@ -209,11 +219,11 @@ TEST(Acceptance, InferredPatchesHaveNoSayAboutMeasuredOnes) {
   EXPECT_EQ(alone->unsupported, 0) << "what was inferred in vain is no loss";
 
   // Whoever only infers a wall does not look through what is before it; who measured it does.
-  const std::vector<PatchLattice> one_for_it = {as_camera(floating, 1), as_camera(inferred_wall, 2)};
+  const std::vector<PatchLattice> one_for_it = {AsCamera(floating, 1), AsCamera(inferred_wall, 2)};
   EXPECT_EQ(AcceptSurface(floating, 2, LoaderOf(one_for_it), {}, pool)->patches_accepted, all);
   PatchLattice inferred_floating = floating;
   std::fill(inferred_floating.quality.begin(), inferred_floating.quality.end(), PatchLattice::kInferredQuality);
-  const std::vector<PatchLattice> one_against_it = {as_camera(inferred_floating, 1), as_camera(wall, 2)};
+  const std::vector<PatchLattice> one_against_it = {AsCamera(inferred_floating, 1), AsCamera(wall, 2)};
   EXPECT_LE(JudgeAgain(inferred_floating, nothing, 2, LoaderOf(one_against_it), {}, pool)->late.CountPatches(), rim);
 }
 
@@ -329,21 +339,13 @@ TEST(Acceptance, WhatMoreCamerasLookThroughThanSupportIsRefused) {
   std::mt19937 generator(6);
   ThreadPool pool(1);
   const Camera camera = CameraAt({0, 0, 0}, 0, 40);
-  PatchLattice wall = RandomSurface(0, camera, 1, 0, generator);
-  std::fill(wall.depth.begin(), wall.depth.end(), 10.0F);
-  std::fill(wall.quality.begin(), wall.quality.end(), 0.9F);
-  PatchLattice floating = wall;
-  std::fill(floating.depth.begin(), floating.depth.end(), 5.0F);
-  const auto as_camera = [](PatchLattice surface, CameraIndex index) {
-    surface.camera_index = index;
-    return surface;
-  };
-  const std::vector<PatchLattice> one_against_one = {as_camera(floating, 1), as_camera(wall, 2)};
+  const PatchLattice wall = FullSurface(camera, 10, generator);
+  const PatchLattice floating = AtDepth(wall, 5);
+  const std::vector<PatchLattice> one_against_one = {AsCamera(floating, 1), AsCamera(wall, 2)};
   // On the rim of the supporter's lattice there are not four rays around a point, so nothing speaks against it.
   const int64_t rim = 2 * (floating.lattice.columns + floating.lattice.rows);
   EXPECT_LE(AcceptSurface(floating, 2, LoaderOf(one_against_one), {}, pool)->patches_accepted, rim);
-  const std::vector<PatchLattice> two_against_one = {as_camera(floating, 1), as_camera(wall, 2),
-                                                     as_camera(floating, 3)};
+  const std::vector<PatchLattice> two_against_one = {AsCamera(floating, 1), AsCamera(wall, 2), AsCamera(floating, 3)};
   EXPECT_GT(AcceptSurface(floating, 3, LoaderOf(two_against_one), {}, pool)->patches_accepted, rim);
   // What lies behind a supporter's surface is hidden from it: no conflict.
   EXPECT_GT(AcceptSurface(wall, 2, LoaderOf(one_against_one), {}, pool)->patches_accepted, rim);
