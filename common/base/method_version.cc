@@ -3,6 +3,6 @@
 
 namespace meshwright {
 
-const int kMethodVersion = 4;
+const int kMethodVersion = 5;
 
 }  // namespace meshwright

@@ -119,12 +119,52 @@ class Grower {
       if (best == 1 && q[0] > PatchScorer::kNoScore && q[2] > PatchScorer::kNoScore && curvature < -1e-6F) {
         offset = std::clamp(0.5F * (q[0] - q[2]) / curvature, -0.5F, 0.5F);
       }
-      const float quality = q[static_cast<size_t>(best)];
-      if (quality <= static_cast<float>(options_.min_quality)) continue;
-      candidate.patch = {{on_plane.w - offset * step, fitted.gx, fitted.gy}, quality, p.sigma, p.seed, node, -1};
+      candidate.patch = {
+          {on_plane.w - offset * step, fitted.gx, fitted.gy}, q[static_cast<size_t>(best)], p.sigma, p.seed, node, -1};
+      if (candidate.patch.quality <= static_cast<float>(options_.min_quality)) {
+        scored += 3;
+        if (!ChooseTargetsAnew(window, x, y, {on_plane.w, fitted.gx, fitted.gy}, step, candidate.patch)) continue;
+      }
       candidate.proposed = !IsBehindAccepted(node, candidate.patch.plane.w);
     }
     return scored;
+  }
+
+  // Ours: where Sigma, which the paper hands on from the seed, does not see the surface any more, it goes on in the
+  // targets that do: those that agree with the best of the three tentative patches around `plane`, several of them,
+  // and better than Sigma had to, for the surface may have ended. Sets depth, quality and Sigma of `patch`.
+  bool ChooseTargetsAnew(const PatchScorer::Window& window, int x, int y, const PatchPlane& plane, float step,
+                         GrownPatch& patch) const {
+    patch.quality = 0;
+    for (int k = -1; k <= 1; ++k) {
+      const PatchPlane tentative{plane.w - static_cast<float>(k) * step, plane.gx, plane.gy};
+      std::array<float, 32> score{};
+      float most = PatchScorer::kNoScore;
+      for (int target = 0; target < scorer_.targets(); ++target) {
+        float& q = score[static_cast<size_t>(target)];
+        q = PatchScorer::kNoScore;
+        const float moved_px = step * scorer_.PixelsPerInverseDepth(x, y, plane.w, target);
+        if (moved_px < kMinMovement * static_cast<float>(stacks_.lattice.step)) continue;
+        q = scorer_.Score(window, x, y, tentative, target);
+        most = std::max(most, q);
+      }
+      const float least = std::max(kMinQualityAnew, most - kMaxDeficitAnew);
+      float sum = 0;
+      int count = 0;
+      uint32_t sigma = 0;
+      for (int target = 0; target < scorer_.targets(); ++target) {
+        const float q = score[static_cast<size_t>(target)];
+        if (q < least) continue;
+        sum += q;
+        ++count;
+        sigma |= uint32_t{1} << target;
+      }
+      if (count < kMinTargetsAnew || sum <= static_cast<float>(count) * patch.quality) continue;
+      patch.plane = tentative;
+      patch.quality = sum / static_cast<float>(count);
+      patch.sigma = sigma;
+    }
+    return patch.quality > 0;
   }
 
   // Conditions that need no score: (1) nothing of this seed on the ray yet, (4) nothing within d_r, (5) room.
@@ -221,6 +261,12 @@ class Grower {
     }
   }
 
+  // Targets chosen anew: how many, their least NCC, how far below the best of them, and how far one step in depth has
+  // to move the patch in them (3 degrees of apical angle), px per px of the lattice's step.
+  static constexpr int kMinTargetsAnew = 2;
+  static constexpr float kMinQualityAnew = 0.75F;
+  static constexpr float kMaxDeficitAnew = 0.25F;
+  static constexpr float kMinMovement = 0.05F;
   static constexpr float kSlopePrior = 2.0F;         // weight of p's slope, in squared lattice steps
   static constexpr float kAcceptedBallSteps = 3.0F;  // an accepted patch this near already is this surface
 

@@ -47,6 +47,9 @@ struct PatchStacks {
 // Grows the seeds over the surface, best quality first, until nothing more passes the tests. Patches are taken from the
 // queue in batches of a fixed size, scored in parallel and inserted in order: the result does not depend on the number
 // of threads.
+//
+// Ours: a patch keeps the targets that its seed had (Sigma) as long as they agree; where they do not, growing goes on
+// in other targets, when at least two agree well.
 PatchStacks Grow(const PatchScorer& scorer, const std::vector<Seed>& seeds, const AcceptedDepth& accepted,
                  const GrowingOptions& options, ThreadPool& pool);
 

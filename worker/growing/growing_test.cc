@@ -92,6 +92,33 @@ TEST_F(GrowingTest, NothingGrowsOnOrBehindWhatIsAccepted) {
   EXPECT_GT(on_the_right, 0);
 }
 
+// A target that sees half of the wall ends nothing: growing goes on in those that see the other half.
+TEST_F(GrowingTest, GoesOnInOtherTargetsWhereItsOwnSeeNothing) {
+  ThreadPool pool(2);
+  std::vector<Seed> seeds = views_->TrueSeeds(views_->Scorer(), 8);
+  const Lattice& lattice = views_->lattice;
+  const auto is_left = [&](int32_t node) { return node % lattice.columns < lattice.columns / 2; };
+  std::erase_if(seeds, [&](const Seed& seed) { return !is_left(seed.node) || (seed.sigma & 1U) == 0; });
+  ASSERT_GT(seeds.size(), 30U);
+  for (Seed& seed : seeds) seed.sigma = 1;
+  const auto share_right = [&](const PatchScorer& scorer) {
+    const PatchStacks stacks =
+        Grow(scorer, seeds, AcceptedDepth::Empty(views_->reference_camera(), 2), GrowingOptions(), pool);
+    int64_t right = 0;
+    int64_t near = 0;
+    for (const GrownPatch& patch : stacks.patches) {
+      if (is_left(patch.node)) continue;
+      ++right;
+      near += views_->ErrorInSteps(patch.node, patch.plane.w) < 2 ? 1 : 0;
+    }
+    EXPECT_GE(static_cast<double>(near), 0.8 * static_cast<double>(right));
+    return static_cast<double>(right) / (0.5 * static_cast<double>(lattice.nodes()));
+  };
+  const double all_seen = share_right(views_->Scorer());
+  const double half_seen = share_right(views_->Scorer({}, 0.5));
+  EXPECT_GT(half_seen, 0.8 * all_seen) << "of " << all_seen;
+}
+
 TEST_F(GrowingTest, NoSeedsNoPatches) {
   ThreadPool pool(1);
   const PatchScorer scorer = views_->Scorer();

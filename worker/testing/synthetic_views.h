@@ -23,9 +23,11 @@ struct SyntheticViews {
   Lattice lattice;
   DepthMap truth;  // over `lattice`
 
-  PatchScorer Scorer(const PatchScorer::Options& options = {}) const {
+  // Of the first target only so much of its width is to be used.
+  PatchScorer Scorer(const PatchScorer::Options& options = {}, double share_of_first = 1) const {
     return PatchScorer(ViewOf(reference),
-                       {ViewOf(targets[0]), ViewOf(targets[1]), ViewOf(targets[2]), ViewOf(targets[3])}, options);
+                       {ViewOf(targets[0], share_of_first), ViewOf(targets[1]), ViewOf(targets[2]), ViewOf(targets[3])},
+                       options);
   }
 
   const Camera& reference_camera() const { return scene.cameras[static_cast<size_t>(reference)]; }
@@ -74,9 +76,16 @@ struct SyntheticViews {
   }
 
  private:
-  ScoredView ViewOf(int i) const {
+  ScoredView ViewOf(int i, double share = 1) const {
     const auto index = static_cast<size_t>(i);
-    return {scene.cameras[index], std::make_shared<SamplingImage>(ToGrey(scene.images[index]), 3)};
+    const ColorImage& image = scene.images[index];
+    ColorImage mask{image.width, image.height, std::vector<uint8_t>(image.rgb.size(), 255)};
+    for (size_t k = 0; k < mask.rgb.size(); ++k) {
+      const auto x = static_cast<double>(k / 3 % static_cast<size_t>(image.width));
+      if (x >= share * image.width) mask.rgb[k] = 0;
+    }
+    IgnoredPixels ignored = share < 1 ? IgnoredPixels(mask) : IgnoredPixels();
+    return {scene.cameras[index], std::make_shared<SamplingImage>(ToGrey(image), 3, std::move(ignored))};
   }
 };
 
