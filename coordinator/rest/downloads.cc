@@ -11,6 +11,7 @@
 #include <absl/strings/strip.h>
 
 #include "common/base/digest.h"
+#include "common/base/relative_path.h"
 #include "common/base/status_macros.h"
 #include "common/http_server/byte_range.h"
 #include "coordinator/rest/problem.h"
@@ -20,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kFilesKept = 8;
+constexpr size_t kKept = 8;
 
 std::string Quoted(const std::string& etag) { return absl::StrCat("\"", etag, "\""); }
 
@@ -103,20 +104,54 @@ absl::StatusOr<std::unique_ptr<DerivedFiles>> DerivedFiles::Open(const std::stri
 
 absl::StatusOr<std::shared_ptr<const OpenedFile>> DerivedFiles::Get(
     const std::string& key, const std::function<absl::Status(const std::string&)>& make) {
+  MW_ASSIGN_OR_RETURN(const std::string path, Make(key, make));
+  return OpenedFile::Open(path);
+}
+
+absl::StatusOr<std::shared_ptr<const OpenedFile>> DerivedFiles::GetFrom(
+    const std::string& key, const std::string& name, const std::function<absl::Status(const std::string&)>& make) {
+  MW_RETURN_IF_ERROR(ValidateRelativePath(name));
+  MW_ASSIGN_OR_RETURN(const std::string folder, Make(key, make));
+  const std::string path = absl::StrCat(folder, "/", name);
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return absl::NotFoundError("there is nothing at this path");
+  return OpenedFile::Open(path);
+}
+
+absl::StatusOr<std::string> DerivedFiles::Make(const std::string& key,
+                                               const std::function<absl::Status(const std::string&)>& make) {
   const std::string path = absl::StrCat(folder_, "/", Sha256Hex(key));
+  if (Use(path)) return path;
+  const MutexLock lock(making_);
+  if (Use(path)) return path;  // somebody else has made it meanwhile
+  const absl::Status made = make(path);
+  if (made.ok()) {
+    Add(path);
+    return path;
+  }
+  std::error_code error;
+  fs::remove_all(path, error);
+  return made;
+}
+
+bool DerivedFiles::Use(const std::string& path) {
   const MutexLock lock(mutex_);
-  if (last_use_.count(path) == 0) {
-    MW_RETURN_IF_ERROR(make(path));
-    while (last_use_.size() >= kFilesKept) {
-      const auto oldest = std::min_element(last_use_.begin(), last_use_.end(),
-                                           [](const auto& a, const auto& b) { return a.second < b.second; });
-      std::error_code error;
-      fs::remove(oldest->first, error);
-      last_use_.erase(oldest);
-    }
+  const auto found = last_use_.find(path);
+  if (found == last_use_.end()) return false;
+  found->second = ++uses_;
+  return true;
+}
+
+void DerivedFiles::Add(const std::string& path) {
+  const MutexLock lock(mutex_);
+  while (last_use_.size() >= kKept) {
+    const auto oldest = std::min_element(last_use_.begin(), last_use_.end(),
+                                         [](const auto& a, const auto& b) { return a.second < b.second; });
+    std::error_code error;
+    fs::remove_all(oldest->first, error);
+    last_use_.erase(oldest);
   }
   last_use_[path] = ++uses_;
-  return OpenedFile::Open(path);
 }
 
 }  // namespace meshwright

@@ -28,8 +28,8 @@ absl::Status SendImmutable(RestCall& call, const std::string& etag, const std::s
 // Whether the client's copy is good.
 bool HasCopy(const RestCall& call, const std::string& etag);
 
-// Files that are made from others when they are asked for, one at a time, so that memory stays bounded. The last few
-// are kept. Thread-safe.
+// Files, and folders of files, that are made from others when they are asked for, one at a time, so that memory stays
+// bounded; what is there already is not waited for. The last few are kept. Thread-safe.
 class DerivedFiles {
  public:
   // Makes the folder, or empties it.
@@ -39,9 +39,21 @@ class DerivedFiles {
   absl::StatusOr<std::shared_ptr<const OpenedFile>> Get(const std::string& key,
                                                         const std::function<absl::Status(const std::string&)>& make);
 
+  // The file `name` in the folder of this key, which `make` fills when it is not there. NotFound where there is no
+  // such file; `name` leads nowhere outside of the folder.
+  absl::StatusOr<std::shared_ptr<const OpenedFile>> GetFrom(
+      const std::string& key, const std::string& name, const std::function<absl::Status(const std::string&)>& make);
+
  private:
   explicit DerivedFiles(std::string folder) : folder_(std::move(folder)) {}
+  // The path at which what this key stands for lies, made if it was not there.
+  absl::StatusOr<std::string> Make(const std::string& key, const std::function<absl::Status(const std::string&)>& make);
+  // Whether it is there; it is used now.
+  bool Use(const std::string& path);
+  void Add(const std::string& path);
+
   const std::string folder_;
+  Mutex making_;  // held while one is made, and taken before mutex_
   Mutex mutex_;
   int64_t uses_ ABSL_GUARDED_BY(mutex_) = 0;
   std::map<std::string, int64_t> last_use_ ABSL_GUARDED_BY(mutex_);  // path -> the last one of uses_

@@ -82,12 +82,14 @@ class RealRestServer final : public RestServer, private HttpHandler {
     MW_ASSIGN_OR_RETURN(uploads_, SceneUploads::Open(options_.folder + "/uploads", *context_.reconstructions));
     MW_ASSIGN_OR_RETURN(derived_, DerivedFiles::Open(options_.folder + "/derived"));
     MW_ASSIGN_OR_RETURN(textured_, DerivedFiles::Open(options_.folder + "/textured"));
+    MW_ASSIGN_OR_RETURN(tilesets_, DerivedFiles::Open(options_.folder + "/tilesets"));
     feeds_ = std::make_unique<EventFeeds>(
         *context_.reconstructions, EventFeedOptions{.max_streams = options_.max_event_streams,
                                                     .max_streams_per_caller = options_.max_event_streams_per_caller});
     context_.uploads = uploads_.get();
     context_.derived = derived_.get();
     context_.textured = textured_.get();
+    context_.tilesets = tilesets_.get();
     context_.feeds = feeds_.get();
     router_ = std::make_unique<Router>(MakeRoutes(context_));
     const int cores = static_cast<int>(std::thread::hardware_concurrency());
@@ -177,6 +179,7 @@ class RealRestServer final : public RestServer, private HttpHandler {
   std::unique_ptr<SceneUploads> uploads_;
   std::unique_ptr<DerivedFiles> derived_;
   std::unique_ptr<DerivedFiles> textured_;
+  std::unique_ptr<DerivedFiles> tilesets_;
   std::unique_ptr<EventFeeds> feeds_;
   std::unique_ptr<Router> router_;
   std::unique_ptr<HttpServer> server_;

@@ -11,6 +11,8 @@
 #include "common/base/digest.h"
 #include "common/base/status_macros.h"
 #include "common/mesh/formats/mesh_format.h"
+#include "common/mesh/formats/mesh_rows.h"
+#include "common/mesh/formats/tileset.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/surface_mesh.h"
 #include "common/surface/codec.h"
@@ -25,6 +27,8 @@ namespace {
 
 constexpr int64_t kMaxSequence = std::numeric_limits<SequenceNumber>::max();
 constexpr char kPlyType[] = "model/ply";
+constexpr char kGlbType[] = "model/gltf-binary";
+constexpr char kTileset[] = "tileset.json";
 constexpr int64_t kDefaultPreviewFaces = 20'000;
 constexpr int64_t kMaxPreviewFaces = 4'000'000;
 
@@ -155,6 +159,22 @@ absl::Status SendTextured(const RestContext& context, RestCall& call, const Mesh
   return SendFile(call, std::move(file), key, format.media_type, absl::StrCat(id, "-textured", format.ending));
 }
 
+// One file of the mesh as a tileset, which is made when the first of them is asked for.
+absl::Status DownloadTile(const RestContext& context, RestCall& call) {
+  const std::string& id = call.path.at("id");
+  const std::string& name = call.path.at("path");
+  MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, context.reconstructions->Get(id));
+  MW_ASSIGN_OR_RETURN(const std::string ply_path, context.reconstructions->MeshPath(id));
+  const std::string key = absl::StrCat("tileset-", reconstruction.mesh_sha256());
+  MW_ASSIGN_OR_RETURN(auto file, context.tilesets->GetFrom(key, name, [&](const std::string& folder) -> absl::Status {
+    MW_ASSIGN_OR_RETURN(const MeshRows mesh, MeshRows::OpenPly(ply_path));
+    return WriteTileset(mesh, absl::StrCat(folder, "/", kTileset), {.compressed = true});
+  }));
+  const size_t slash = name.rfind('/');
+  return SendFile(call, std::move(file), absl::StrCat(key, "-", Sha256Hex(name).substr(0, 16)),
+                  name == kTileset ? kJsonType : kGlbType, slash == std::string::npos ? name : name.substr(slash + 1));
+}
+
 absl::Status ShowReport(const RestContext& context, RestCall& call) {
   const std::string& id = call.path.at("id");
   MW_ASSIGN_OR_RETURN(const v1::Reconstruction reconstruction, context.reconstructions->Get(id));
@@ -230,6 +250,7 @@ void AddResultRoutes(const RestContext& context, std::vector<Route>& routes) {
   add("/v1/reconstructions/{id}/parts/{sequence}/preview", {"max_faces"}, PreviewPart);
   add("/v1/reconstructions/{id}/mesh", {"partial", "format", "texture"}, DownloadMesh);
   add("/v1/reconstructions/{id}/mesh.glb", {}, DownloadGlb);
+  add("/v1/reconstructions/{id}/tiles/{path}", {}, DownloadTile);
   add("/v1/reconstructions/{id}/report", {}, ShowReport);
   add("/v1/formats", {}, ListFormats);
 }

@@ -28,6 +28,7 @@ struct RestContext {
   SceneUploads* uploads = nullptr;
   DerivedFiles* derived = nullptr;
   DerivedFiles* textured = nullptr;  // which take long, so that the others do not wait for them
+  DerivedFiles* tilesets = nullptr;
   EventFeeds* feeds = nullptr;
   std::function<absl::Status()> ready;
   std::string options_json;  // the answer of GET /v1/options

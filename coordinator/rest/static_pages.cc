@@ -38,8 +38,10 @@ constexpr std::array<ContentType, 15> kContentTypes = {{{".html", "text/html; ch
                                                         {".txt", "text/plain; charset=utf-8"},
                                                         {".glb", "model/gltf-binary"}}};
 
+// Compiling WebAssembly is for the decoder of compressed tiles.
 constexpr char kPolicy[] =
-    "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; worker-src 'self' blob:; "
+    "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; img-src 'self' blob: data:; style-src 'self' "
+    "'unsafe-inline'; worker-src 'self' blob:; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'self'";
 
 constexpr char kNoPage[] =

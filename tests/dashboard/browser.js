@@ -72,6 +72,7 @@ export function meshNumbers(page) {
     parts: Number(dataset.parts),
     faces: Number(dataset.faces),
     shown: Number(dataset.shown),
+    tiles: Number(dataset.tiles),
     complete: dataset.complete === 'true',
   }));
 }

@@ -161,6 +161,8 @@ TEST_F(MalformedCallsTest, OverHttp) {
       {"GET", there + "/mesh?format=obj&texture=true", "", 400, "texture", "format=glb"},
       {"GET", there + "/mesh?texture=true", "", 400, "texture", "format=glb"},
       {"GET", there + "/mesh.glb", "", 409, "", "one that is done"},
+      {"GET", there + "/tiles/tileset.json", "", 409, "", "one that is done"},
+      {"GET", all + "/none/tiles/tileset.json", "", 404, "", "none"},
   };
   for (const Case& c : cases) {
     httplib::Request request;

@@ -150,6 +150,21 @@ TEST_F(RestTest, FromAnInterruptedUploadToTheMesh) {
     EXPECT_EQ(converted->body == mesh->body, format["name"] == "ply");
   }
 
+  // Levels of detail: what tileset.json names is there, and nothing else.
+  const auto tileset = http_->Get(base + "/tiles/tileset.json");
+  ASSERT_TRUE(tileset && tileset->status == 200) << (tileset ? tileset->body : "");
+  EXPECT_EQ(tileset->get_header_value("Content-Type"), "application/json");
+  const std::string root = Json::parse(tileset->body)["root"]["content"]["uri"];
+  const auto tile = http_->Get(base + "/tiles/" + root);
+  EXPECT_EQ(tile->get_header_value("Content-Type"), "model/gltf-binary");
+  EXPECT_THAT(tile->body, StartsWith("glTF"));
+  const std::string tile_etag = tile->get_header_value("ETag");
+  EXPECT_EQ(http_->Get(base + "/tiles/" + root, {{"If-None-Match", tile_etag}})->status, 304);
+  EXPECT_EQ(http_->Get(base + "/tiles/tileset.tiles/r999.glb")->status, 404);
+  for (const char* outside : {"/tiles/..%2Ftileset.json", "/tiles/%2Fetc%2Fpasswd", "/tiles/"}) {
+    EXPECT_EQ(http_->Get(base + outside)->status, 400) << outside;
+  }
+
   // Again with other options, of the same files.
   const auto again = PostJson(base + ":again", R"({"id":"c8","optionsJson":"{\"lattice-step\":4}"})");
   ASSERT_EQ(again->status, 200) << again->body;

@@ -115,9 +115,10 @@ absl::StatusOr<const MeshFormat*> MeshFormatByName(const std::string& name) {
   for (const MeshFormat& format : MeshFormats()) {
     if (name != format.name) continue;
     if (!format.has_folder) return &format;
-    return absl::InvalidArgumentError(absl::StrCat("format is \"", name, "\", which is a folder of files: ",
-                                                   "meshwright fetch -o DIR/tileset.json makes it; expected one of ",
-                                                   NamesOfSingleFiles()));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "format is \"", name, "\", which is a folder of files: over REST ",
+        "tiles/tileset.json below the reconstruction, or meshwright fetch -o DIR/tileset.json; expected one of ",
+        NamesOfSingleFiles()));
   }
   return absl::InvalidArgumentError(
       absl::StrCat("format is \"", name.substr(0, 32), "\", expected one of ", NamesOfSingleFiles()));

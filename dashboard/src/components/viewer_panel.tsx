@@ -3,7 +3,7 @@
 import { useSignalEffect } from '@preact/signals';
 import type { RefObject } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { reconstructionUrl } from '../api/client';
+import { api, reconstructionUrl } from '../api/client';
 import { CAMERA_STATES, isOver, stateOf } from '../api/types';
 import { count } from '../format';
 import type { ReconstructionStore } from '../state/reconstruction_store';
@@ -15,6 +15,7 @@ import { PartLoader } from '../view3d/part_loader';
 import type { PhotoPlace } from '../view3d/photo_place';
 import type { Region } from '../view3d/region';
 import type { SceneViewer } from '../view3d/scene_viewer';
+import type { TileLayer } from '../view3d/tile_layer';
 import { CropBox } from './crop_box';
 import { Notice, Segmented } from './pieces';
 
@@ -41,6 +42,7 @@ interface ViewerNumbers {
   parts: number;
   faces: number;
   shown: number;
+  tiles: number; // of the one mesh, when it is what is seen
   complete: boolean;
   region: Region | null; // that the surface fills
 }
@@ -68,6 +70,7 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
     parts: 0,
     faces: 0,
     shown: 0,
+    tiles: 0,
     complete: false,
     region: null,
   });
@@ -118,7 +121,9 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
       times = [];
       budget = nextBudget(budget, LARGEST_BUDGET, median, made.shownFaces);
       loading.setBudget(budget);
+      made.setTileBudget(budget);
     };
+    made.setTileBudget(budget);
     setViewer(made);
     setLoader(loading);
     const counting = setInterval(() => {
@@ -126,6 +131,7 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
         parts: loading.parts.size,
         faces: loading.facesOfWhole,
         shown: made.shownFaces,
+        tiles: made.shownTiles,
         complete: loading.complete && made.upToDate,
         region: made.surfaceRegion,
       });
@@ -149,9 +155,33 @@ function useViewer(canvas: RefObject<HTMLCanvasElement>, { store, selected, onSe
     if (store.cameras.value !== null) viewer.setCameras(store.cameras.value);
     loader?.add(store.parts.value);
   }, [viewer, loader]);
+  const done = store.reconstruction.value !== null && stateOf(store.reconstruction.value) === 'DONE';
+  useEffect(() => (viewer !== null && done ? showMesh(viewer, store.id) : undefined), [viewer, done]);
   useEffect(() => viewer?.setBackground(cssColor('--stage')), [viewer, theme.value]);
   useEffect(() => viewer?.select(selected), [viewer, selected, store.cameras.value]);
   return { viewer, failure, numbers, photo, measured };
+}
+
+// The one mesh takes the place of the surfaces when its first tiles are there; where it cannot be had they stay. The
+// answer ends it.
+function showMesh(viewer: SceneViewer, id: string): () => void {
+  let closed = false;
+  let layer: TileLayer | null = null;
+  const close = () => {
+    closed = true;
+    if (layer === null) return;
+    viewer.showTiles(null);
+    layer.dispose();
+    layer = null;
+  };
+  void Promise.all([untilLoaded(() => import('../view3d/tile_layer')), api.offset(id)])
+    .then(([{ TileLayer }, offset]) => {
+      if (closed) return;
+      layer = new TileLayer(reconstructionUrl(id, '/tiles/tileset.json'), offset);
+      viewer.showTiles(layer);
+    })
+    .catch(() => {});
+  return close;
 }
 
 const inPixels = ({ left, top, width, height }: PhotoPlace) => ({
@@ -207,7 +237,10 @@ export function ViewerPanel(props: Props) {
       ? state !== null && isOver(state)
         ? 'Nothing was accepted'
         : 'No surface is accepted yet'
-      : `Surfaces of ${count(numbers.parts)} cameras, side by side: ${count(numbers.faces)} triangles` +
+      : numbers.tiles > 0
+        ? `The mesh: ${count(Number(store.reconstruction.value?.progress?.faces ?? 0))} triangles` +
+          `, ${count(numbers.shown)} shown`
+        : `Surfaces of ${count(numbers.parts)} cameras, side by side: ${count(numbers.faces)} triangles` +
         (numbers.shown < numbers.faces ? `, ${count(numbers.shown)} shown` : '');
   return (
     <section class="card stage" ref={frame} aria-label="The mesh in 3D">
@@ -312,6 +345,7 @@ export function ViewerPanel(props: Props) {
           data-parts={numbers.parts}
           data-faces={numbers.faces}
           data-shown={numbers.shown}
+          data-tiles={numbers.tiles}
           data-complete={numbers.complete}
           aria-live="off"
         >

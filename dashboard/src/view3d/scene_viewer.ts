@@ -28,6 +28,7 @@ import type { LoadedPart } from './part_loader';
 import { placePhoto, type PhotoPlace } from './photo_place';
 import type { PartGeometry } from './preview_decoder';
 import type { Region } from './region';
+import type { TileLayer } from './tile_layer';
 
 export interface SceneViewerCallbacks {
   onPick: (camera: number) => void;
@@ -69,6 +70,9 @@ export class SceneViewer {
   private readonly up = new Vector3(0, 0, 1);
   private readonly cameraBox = new Box3();
   private readonly partBox = new Box3();
+  private tiles: TileLayer | null = null;
+  private tileBudget = Infinity;
+  private coloring: Coloring = 'photo';
   private queue: { part: LoadedPart; geometry: PartGeometry | null }[] = [];
   private table: CameraTable | null = null;
   private frameRequested = 0;
@@ -117,8 +121,39 @@ export class SceneViewer {
   }
 
   setColoring(coloring: Coloring) {
+    this.coloring = coloring;
     this.parts.setColoring(coloring);
+    this.tiles?.setColoring(coloring);
     this.draw();
+  }
+
+  // The one mesh in the place of the surfaces that it was joined from; null: those again.
+  showTiles(tiles: TileLayer | null) {
+    if (this.tiles !== null) this.scene.remove(this.tiles.group);
+    this.tiles = tiles;
+    if (tiles !== null) {
+      tiles.onChange(() => this.draw());
+      tiles.setColoring(this.coloring);
+      tiles.setBudget(this.tileBudget);
+      this.scene.add(tiles.group);
+    }
+    this.draw();
+  }
+
+  // Triangles of the mesh to show, about.
+  setTileBudget(faces: number) {
+    this.tileBudget = faces;
+    this.tiles?.setBudget(faces);
+  }
+
+  // Tiles of the mesh that are seen; 0 while it is the surfaces.
+  get shownTiles(): number {
+    return this.showsTiles ? this.tiles!.count : 0;
+  }
+
+  // Not where colours are those of cameras, which the mesh does not know.
+  private get showsTiles(): boolean {
+    return this.tiles !== null && this.tiles.ready && this.coloring !== 'camera';
   }
 
   showFrusta(shown: boolean) {
@@ -150,7 +185,7 @@ export class SceneViewer {
   }
 
   get shownFaces(): number {
-    return this.parts.faces;
+    return this.showsTiles ? this.tiles!.faces : this.parts.faces;
   }
 
   select(camera: number) {
@@ -183,12 +218,12 @@ export class SceneViewer {
     this.draw();
   }
 
-  // What the surface fills; null while there is none.
   // Whether all that it was told to show is there.
   get upToDate(): boolean {
-    return this.queue.length === 0;
+    return this.queue.length === 0 && (!this.showsTiles || this.tiles!.complete);
   }
 
+  // What the surface fills; null while there is none.
   get surfaceRegion(): Region | null {
     const { min, max } = this.partBox;
     return this.partBox.isEmpty() ? null : [min.x, min.y, min.z, max.x, max.y, max.z];
@@ -290,7 +325,7 @@ export class SceneViewer {
     ray.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.view);
     const { geometry } = this.parts.mesh;
     geometry.boundingSphere = this.partBox.getBoundingSphere(new Sphere());
-    const hit = ray.intersectObject(this.parts.mesh)[0];
+    const hit = ray.intersectObject(this.showsTiles ? this.tiles!.group : this.parts.mesh)[0];
     if (hit === undefined) return;
     this.measure.add(hit.point);
     this.callbacks.onMeasure(this.measure.count, this.measure.distance);
@@ -343,10 +378,18 @@ export class SceneViewer {
       this.light.target.position.copy(this.controls.target);
       this.light.target.updateMatrixWorld();
       this.placeClippingPlanes();
+      this.updateTiles();
       this.renderer.render(this.scene, this.view);
       this.waitForFrame();
       if (this.queue.length > 0) this.wanted = true;
     });
+  }
+
+  private updateTiles() {
+    const { tiles } = this;
+    if (tiles !== null && this.coloring !== 'camera') tiles.update(this.view, this.renderer);
+    if (tiles !== null) tiles.group.visible = this.showsTiles;
+    this.parts.mesh.visible = !this.showsTiles;
   }
 
   private waitForFrame() {
