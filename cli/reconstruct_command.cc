@@ -10,8 +10,8 @@
 
 #include "pipeline/local/local_reconstruction.h"
 #include "pipeline/local/time_estimate.h"
-#include "pipeline/local/verdict.h"
 #include "pipeline/options/option_table.h"
+#include "pipeline/report/verdict.h"
 
 #include "cli/camera_stage.h"
 #include "cli/commands.h"

@@ -57,6 +57,10 @@ void PrintReconstruction(const v1::Reconstruction& reconstruction) {
   if (progress.cameras_skipped() > 0) std::printf(", %d skipped", progress.cameras_skipped());
   std::printf("%s%s\n", reconstruction.failure().empty() ? "" : " ", reconstruction.failure().c_str());
   for (const std::string& warning : reconstruction.warnings()) std::printf("  %s\n", warning.c_str());
+  const v1::Verdict& verdict = reconstruction.verdict();
+  for (const std::string& text : {verdict.summary(), verdict.warning()}) {
+    if (!text.empty()) std::printf("  %s\n", text.c_str());
+  }
 }
 
 int Show(const absl::StatusOr<v1::Reconstruction>& reconstruction, const ServiceArguments& service) {
@@ -186,6 +190,25 @@ std::string NameOf(v1::ReconstructionState state) {
   return absl::AsciiStrToLower(name.substr(sizeof(kStatePrefix) - 1));
 }
 
+// As report.json of a reconstruction in one process has it.
+Json VerdictJson(const v1::Verdict& verdict) {
+  Json json = {{"coverage", verdict.coverage()},
+               {"inferred", verdict.inferred()},
+               {"blind", verdict.blind()},
+               {"inconsistent", verdict.inconsistent()},
+               {"unsupported", verdict.unsupported()},
+               {"contradicted", verdict.contradicted()},
+               {"least_covered", nullptr},
+               {"cameras_off_px", nullptr}};
+  if (verdict.has_least_covered()) {
+    json["least_covered"] = {{"name", verdict.least_covered().name()},
+                             {"coverage", verdict.least_covered().coverage()}};
+  }
+  if (verdict.has_cameras_off_px()) json["cameras_off_px"] = verdict.cameras_off_px();
+  if (!verdict.warning().empty()) json["warning"] = verdict.warning();
+  return json;
+}
+
 Json ToJson(const v1::Reconstruction& reconstruction) {
   const v1::Progress& progress = reconstruction.progress();
   Json json;
@@ -210,6 +233,7 @@ Json ToJson(const v1::Reconstruction& reconstruction) {
                     {"bytes", reconstruction.mesh_bytes()},
                     {"sha256", reconstruction.mesh_sha256()}};
   }
+  if (reconstruction.has_verdict()) json["verdict"] = VerdictJson(reconstruction.verdict());
   return json;
 }
 

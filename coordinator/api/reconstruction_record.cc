@@ -6,6 +6,7 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <google/protobuf/util/json_util.h>
 
 #include "coordinator/api/public_text.h"
 #include "coordinator/dispatch/proto_times.h"
@@ -71,6 +72,14 @@ v1::Reconstruction ToProto(const Reconstruction& stored) {
   }
   reconstruction.set_mesh_bytes(stored.mesh.bytes);
   reconstruction.set_mesh_sha256(stored.mesh.digest);
+  if (stored.state == ReconstructionState::kDone && !stored.mesh.verdict_json.empty()) {
+    google::protobuf::util::JsonParseOptions lenient;
+    lenient.ignore_unknown_fields = true;  // of later programs
+    v1::Verdict verdict;
+    if (google::protobuf::util::JsonStringToMessage(stored.mesh.verdict_json, &verdict, lenient).ok()) {
+      *reconstruction.mutable_verdict() = std::move(verdict);
+    }
+  }
   v1::Progress& progress = *reconstruction.mutable_progress();
   progress.set_cameras_total(static_cast<int32_t>(stored.progress.cameras_total));
   progress.set_cameras_committed(static_cast<int32_t>(stored.progress.cameras_committed));

@@ -355,8 +355,7 @@ absl::Status ReconstructionDriver::Join(const ReconstructionConfig& config, Oute
 
 absl::StatusOr<JoinedMeshCounts> ReconstructionDriver::TryToWriteMesh(const ReconstructionConfig& config,
                                                                       const Conductor& conductor,
-                                                                      const std::string& path,
-                                                                      std::vector<AcceptedSurface>& surfaces) {
+                                                                      const std::string& path, JudgedSurfaces& judged) {
   LostBlobNamer blobs(*environment_.blobs);
   const auto put = [&](const std::string& bytes) { return referenced_blobs_.Put(bytes); };
   const ForecastInput forecast = conductor.ForecastNow();
@@ -369,13 +368,12 @@ absl::StatusOr<JoinedMeshCounts> ReconstructionDriver::TryToWriteMesh(const Reco
   };
   const std::vector<CommittedSurface> committed = conductor.CommittedSurfaces();
   MW_ASSIGN_OR_RETURN(
-      JudgedSurfaces judged_surfaces,
-      JudgeCommittedSurfaces(committed, config.conductor.acceptance, blobs, put, *environment_.pool, [&](int judged) {
-        joining.SetJudged(static_cast<double>(judged) / static_cast<double>(committed.size()));
+      judged,
+      JudgeCommittedSurfaces(committed, config.conductor.acceptance, blobs, put, *environment_.pool, [&](int done) {
+        joining.SetJudged(static_cast<double>(done) / static_cast<double>(committed.size()));
         tell();
       }));
-  surfaces = std::move(judged_surfaces.surfaces);
-  return WriteAcceptedMesh(surfaces, blobs, config.join, offset_, path, *environment_.pool, [&](double share) {
+  return WriteAcceptedMesh(judged.surfaces, blobs, config.join, offset_, path, *environment_.pool, [&](double share) {
     joining.SetJoined(share);
     tell();
   });
@@ -393,15 +391,16 @@ void ReconstructionDriver::TellJoining(const JoiningProgress& joining, const Con
 
 absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionConfig& config, OuterLoop& loop) {
   const std::string path = absl::StrCat(folders_.data, "/meshes/", id_, "-", epoch_, ".new");
+  JudgedSurfaces judged;
   absl::StatusOr<JoinedMeshCounts> counts = absl::UnknownError("not tried");
   for (int attempt = 0; attempt < kMaxRepairsInARow && !counts.ok(); ++attempt) {
-    std::vector<AcceptedSurface> surfaces;
-    counts = TryToWriteMesh(config, loop.conductor(), path, surfaces);
+    judged = {};
+    counts = TryToWriteMesh(config, loop.conductor(), path, judged);
     if (counts.ok()) break;
     const std::string lost = LostBlobOf(counts.status());
     if (lost.empty()) return counts.status();
     // What was judged is judged again with the next attempt; all else has its source.
-    const bool is_judged = std::any_of(surfaces.begin(), surfaces.end(),
+    const bool is_judged = std::any_of(judged.surfaces.begin(), judged.surfaces.end(),
                                        [&](const AcceptedSurface& surface) { return surface.digest == lost; });
     if (!is_judged) MW_RETURN_IF_ERROR(Repair(loop, lost));
   }
@@ -410,7 +409,17 @@ absl::StatusOr<StoredMesh> ReconstructionDriver::WriteMesh(const ReconstructionC
   MW_RETURN_IF_ERROR(referenced_blobs_.PutFile(path, facts.sha256));
   std::error_code error;
   fs::rename(path, folders_.MeshFile(facts.sha256), error);
-  return StoredMesh{.digest = facts.sha256, .bytes = facts.bytes, .vertices = counts->vertices, .faces = counts->faces};
+  return StoredMesh{.digest = facts.sha256,
+                    .bytes = facts.bytes,
+                    .vertices = counts->vertices,
+                    .faces = counts->faces,
+                    .verdict_json = MakeVerdict(judged)};
+}
+
+// The mesh is there: whatever keeps a verdict from being given does not take it away.
+std::string ReconstructionDriver::MakeVerdict(const JudgedSurfaces& judged) const {
+  if (!environment_.make_verdict) return "";
+  return environment_.make_verdict(id_, judged.cameras).value_or("");
 }
 
 }  // namespace meshwright

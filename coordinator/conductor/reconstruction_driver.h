@@ -19,6 +19,7 @@
 #include "common/blob/blob_store.h"
 #include "common/scene/scene.h"
 #include "coordinator/conductor/conductor_lease.h"
+#include "coordinator/conductor/final_surfaces.h"
 #include "coordinator/conductor/joining_progress.h"
 #include "coordinator/conductor/outer_loop.h"
 #include "coordinator/conductor/reconstruction_config.h"
@@ -36,6 +37,10 @@ struct PhotographFile {
 // None: there are no photographs. Errors are bad input: too few of them, or of kinds that are not read.
 using PhotographLister = std::function<absl::StatusOr<std::vector<PhotographFile>>(const std::string& folder)>;
 
+// What a reconstruction came to, as JSON that is kept with its mesh.
+using VerdictMaker =
+    std::function<absl::StatusOr<std::string>(const std::string& id, const std::vector<JudgedCamera>& judged)>;
+
 // What all reconstructions of a coordinator share. Everything outlives them.
 struct DriverEnvironment {
   JobStore* store = nullptr;
@@ -45,6 +50,7 @@ struct DriverEnvironment {
   std::function<void()> jobs_changed;  // there may be new jobs in the store
   ParseReconstructionConfig parse_config;
   PhotographLister list_photographs;
+  VerdictMaker make_verdict;
   int max_failures = 3;  // a camera whose job failed so often is skipped, >= 1
 };
 
@@ -95,9 +101,10 @@ class ReconstructionDriver {
   absl::StatusOr<std::unique_ptr<OuterLoop>> OpenLoop(const ReconstructionConfig& config);
   absl::Status RunJobs(OuterLoop& loop);
   absl::Status Join(const ReconstructionConfig& config, OuterLoop& loop);
-  // `surfaces` gets what the mesh is made of.
+  // `judged` gets what the mesh is made of.
   absl::StatusOr<JoinedMeshCounts> TryToWriteMesh(const ReconstructionConfig& config, const Conductor& conductor,
-                                                  const std::string& path, std::vector<AcceptedSurface>& surfaces);
+                                                  const std::string& path, JudgedSurfaces& judged);
+  std::string MakeVerdict(const JudgedSurfaces& judged) const;
   void TellJoining(const JoiningProgress& joining, const Conductor& conductor);
   absl::StatusOr<StoredMesh> WriteMesh(const ReconstructionConfig& config, OuterLoop& loop);
   absl::Status Repair(OuterLoop& loop, const std::string& digest);

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "pipeline/config/parse_config.h"
+#include "pipeline/report/stored_verdict.h"
 
 #include "common/base/clock.h"
 #include "common/base/files.h"
@@ -118,6 +119,10 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
                                            .jobs_changed = [this] { workers_->Wake(); },
                                            .parse_config = ParseConfig,
                                            .list_photographs = ListPhotographFiles,
+                                           .make_verdict =
+                                               [this](const std::string& id, const std::vector<JudgedCamera>& judged) {
+                                                 return MakeStoredVerdict(id, judged, *store_, *blobs_);
+                                               },
                                            .max_failures = retry_.max_failures};
     MW_ASSIGN_OR_RETURN(reconstructions_, ReconstructionService::Open(
                                               {.data_folder = data,

@@ -59,6 +59,10 @@ absl::StatusOr<nlohmann::ordered_json> MakeReport(const v1::Reconstruction& reco
   report["scene"] = {{"format", scene.format}, {"photographs", scene.views.size()}};
   const absl::Duration took = SecondsBetween(reconstruction.create_time(), reconstruction.finish_time());
   report["process"] = {{"wall_seconds", absl::ToDoubleSeconds(took)}};
+  MW_ASSIGN_OR_RETURN(const Reconstruction stored, store.GetReconstruction(reconstruction.id()));
+  if (!stored.mesh.verdict_json.empty()) {
+    MW_ASSIGN_OR_RETURN(report["verdict"], ParseJson<nlohmann::ordered_json>(stored.mesh.verdict_json));
+  }
   MW_ASSIGN_OR_RETURN(report["options"], ParseJson<nlohmann::ordered_json>(reconstruction.options_json()));
   return report;
 }

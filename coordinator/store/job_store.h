@@ -39,6 +39,7 @@ struct StoredMesh {
   int64_t bytes = 0;
   int64_t vertices = 0;
   int64_t faces = 0;
+  std::string verdict_json;  // what the reconstruction came to; "" where nobody has said
 };
 
 struct Reconstruction {

@@ -907,14 +907,16 @@ TEST_P(JobStoreConformance, DamagedBlobsAreReportedOnce) {
 TEST_P(JobStoreConformance, AMeshEndsAReconstruction) {
   ASSERT_TRUE(SetState("castle", ReconstructionState::kJoining).ok());
   EXPECT_EQ(store().GetReconstruction("castle")->finished_at, absl::InfinitePast());
-  ASSERT_TRUE(store().FinishReconstruction("castle", {Digest('m'), 5, 6, 7}, kNow + kLease, Conduct("castle")).ok());
-  EXPECT_TRUE(store().FinishReconstruction("castle", {Digest('m'), 5, 6, 7}, kNow + kLease, Conduct("castle")).ok());
+  const StoredMesh mesh = {Digest('m'), 5, 6, 7, R"({"coverage": 0.9})"};
+  ASSERT_TRUE(store().FinishReconstruction("castle", mesh, kNow + kLease, Conduct("castle")).ok());
+  EXPECT_TRUE(store().FinishReconstruction("castle", mesh, kNow + kLease, Conduct("castle")).ok());
   const Reconstruction done = *store().GetReconstruction("castle");
   EXPECT_EQ(done.state, ReconstructionState::kDone);
   EXPECT_EQ(done.finished_at, kNow + kLease);
   EXPECT_EQ(done.created_at, kNow);
   EXPECT_EQ(done.mesh.digest, Digest('m'));
   EXPECT_EQ(done.mesh.faces, 7);
+  EXPECT_EQ(done.mesh.verdict_json, mesh.verdict_json);
   EXPECT_TRUE(absl::IsFailedPrecondition(store().RequestState("castle", ReconstructionState::kCancelled, kNow)));
 }
 

@@ -75,7 +75,7 @@ TEST_F(PostgresJobStoreTest, ManyCoordinatorsMayStartAtOnce) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(opened.load(), kCoordinators);
-  EXPECT_EQ(RunSql(schema_->url(), "SELECT count(*) FROM meshwright_migrations"), "7");
+  EXPECT_EQ(RunSql(schema_->url(), "SELECT count(*) FROM meshwright_migrations"), "8");
 }
 
 TEST_F(PostgresJobStoreTest, ADatabaseOfANewerProgramIsRefused) {

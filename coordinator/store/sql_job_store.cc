@@ -33,8 +33,11 @@ absl::StatusOr<Reconstruction> ReadReconstruction(const SqlRow& row) {
   reconstruction.scene_blob = row.Text(7);
   reconstruction.created_at = row.Time(8);
   if (!row.IsNull(9)) reconstruction.finished_at = row.Time(9);
-  reconstruction.mesh = {
-      .digest = row.Text(10), .bytes = row.Integer(11), .vertices = row.Integer(12), .faces = row.Integer(13)};
+  reconstruction.mesh = {.digest = row.Text(10),
+                         .bytes = row.Integer(11),
+                         .vertices = row.Integer(12),
+                         .faces = row.Integer(13),
+                         .verdict_json = row.Text(24)};
   reconstruction.progress = {.cameras_total = row.Integer(14),
                              .cameras_committed = row.Integer(15),
                              .cameras_skipped = row.Integer(16),
@@ -247,6 +250,7 @@ absl::Status SqlJobStore::FinishReconstruction(const std::string& id, const Stor
                                                                {"mesh_bytes", mesh.bytes},
                                                                {"vertices", mesh.vertices},
                                                                {"faces", mesh.faces},
+                                                               {"verdict_json", mesh.verdict_json},
                                                                {"now", absl::ToUnixMicros(now)},
                                                                {"conductor_epoch", conductor_epoch}}));
   if (result.changed == 1) return absl::OkStatus();

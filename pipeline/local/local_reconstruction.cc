@@ -12,11 +12,11 @@
 #include <absl/strings/str_format.h>
 
 #include "pipeline/config/parse_config.h"
-#include "pipeline/local/verdict.h"
 #include "pipeline/local/work_folder.h"
 #include "pipeline/options/options_json.h"
 #include "pipeline/report/cameras_report.h"
 #include "pipeline/report/report_page.h"
+#include "pipeline/report/verdict.h"
 #include "pipeline/texturing/texture_mesh.h"
 
 #include "common/base/bad_input.h"

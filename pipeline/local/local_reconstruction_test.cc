@@ -191,6 +191,7 @@ TEST_F(LocalReconstructionTest, GoesOnInAWorkFolderWithoutLeasesIfTheMethodIsThe
       "ALTER TABLE workers DROP COLUMN colmap_version; ALTER TABLE workers DROP COLUMN owner;"
       "ALTER TABLE reconstructions DROP COLUMN joined_thousandths;"
       "ALTER TABLE reconstructions DROP COLUMN expected_end_at;"
+      "ALTER TABLE reconstructions DROP COLUMN verdict_json;"
       "UPDATE camera_jobs SET epoch = 1, lease_worker = NULL, lease_expires_at = NULL, lease_instance = NULL,"
       "  leased_at = NULL, memory_bytes = 0, last_ending = 'lost', last_ended_at = 5 WHERE state = 'assigned';";
   ASSERT_FALSE(RunUntil(4, Settings("half", 1)).ok());

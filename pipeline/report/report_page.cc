@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -16,6 +17,7 @@
 #include "pipeline/report/mesh_pictures.h"
 #include "pipeline/report/page_text.h"
 #include "pipeline/report/report_style.h"
+#include "pipeline/report/verdict.h"
 
 #include "common/base/status_macros.h"
 #include "common/image/encode.h"
@@ -44,6 +46,11 @@ struct PhotographFacts {
   std::string thumbnail;         // "" when it cannot be read
   std::string unreadable;
 };
+
+std::string WithCapital(std::string text) {
+  if (!text.empty()) text.front() = absl::ascii_toupper(static_cast<unsigned char>(text.front()));
+  return text;
+}
 
 class Page {
  public:
@@ -121,6 +128,7 @@ class Page {
     AddFact("CPU", SecondsOf(process, "cpu_seconds"));
     AddFact("Memory at most", BytesOf(process, "peak_memory_bytes"));
     absl::StrAppend(&html_, "</dl>\n");
+    AddVerdict();
     const Json& pairs = MemberOf(scene, "pairs");
     if (NumberOf(pairs, "cameras_without_pair") > 0) {
       absl::StrAppend(&html_, "<p class=\"small\">", CountOf(pairs, "cameras_without_pair"),
@@ -128,6 +136,14 @@ class Page {
                       ") and contribute nothing.</p>\n");
     }
     absl::StrAppend(&html_, "</section>\n");
+  }
+
+  void AddVerdict() {
+    const Json& verdict = MemberOf(report_, "verdict");
+    if (!verdict.is_object() || verdict.empty()) return;
+    for (const std::string& text : {DescribeVerdict(verdict), DescribeWarning(verdict)}) {
+      if (!text.empty()) absl::StrAppend(&html_, "<p>", EscapeHtml(WithCapital(text)), ".</p>\n");
+    }
   }
 
   // The camera that sees most of the mesh, and the one that looks most differently of those that see some of it.

@@ -94,14 +94,37 @@ test('from a dropped folder to the downloaded mesh', { timeout: 600_000 }, async
     .first()
     .waitFor();
 
-  // Colours.
-  await until(async () => (await meshNumbers(page)).complete);
-  const photo = await looksOfCanvas(page);
-  await page.getByRole('radio', { name: 'Cameras', exact: true }).check({ force: true });
+  // The one mesh takes the place of the surfaces: it covers what they covered, in their colours.
+  const color = (name) => page.getByRole('radio', { name, exact: true }).check({ force: true });
+  const differsFrom = async ({ mean }) => {
+    const now = await looksOfCanvas(page);
+    return Math.hypot(...now.mean.map((value, k) => value - mean[k]));
+  };
   await until(async () => {
-    const camera = await looksOfCanvas(page);
-    return Math.hypot(...camera.mean.map((value, k) => value - photo.mean[k])) > 10;
-  });
+    const { tiles, complete } = await meshNumbers(page);
+    return tiles > 0 && complete;
+  }, TIMEOUT);
+  await page.getByText(/The mesh: .* triangles/).waitFor();
+  const photo = await looksOfCanvas(page);
+  assert.ok(photo.drawn > 0.9 * seen.at(-1).drawn, `${seen.at(-1).drawn} pixels, then ${photo.drawn}`);
+  assert.ok((await differsFrom(seen.at(-1))) < 12, 'the mesh has the colours of the surfaces');
+  await keepScreenshot(page, 'service-mesh');
+  await color('Shape');
+  await until(async () => (await differsFrom(photo)) > 10);
+  await keepScreenshot(page, 'service-mesh-shape');
+
+  // What it came to, in shares that add up.
+  const verdict = (await (await fetch(`${base}v1/reconstructions/facade`)).json()).verdict;
+  const fates = ['coverage', 'blind', 'inconsistent', 'unsupported', 'contradicted'];
+  const sum = fates.reduce((all, name) => all + (verdict[name] ?? 0), 0);
+  assert.ok(Math.abs(sum - 1) < 1e-6, `shares add up to ${sum}`);
+  assert.ok(verdict.coverage > 0.5 && verdict.inferred <= verdict.coverage, JSON.stringify(verdict));
+  await page.getByText(`${(100 * verdict.coverage).toFixed(0)} % covered`).waitFor();
+
+  // Who made what: the surfaces again, side by side.
+  await color('Cameras');
+  await page.getByText(/Surfaces of \d+ cameras, side by side/).waitFor();
+  await until(async () => (await differsFrom(photo)) > 10);
   await keepScreenshot(page, 'service-cameras', { fullPage: true });
 
   // A camera: its photograph, its neighbours, its numbers.

@@ -17,6 +17,18 @@ export interface Progress {
   joinedShare?: number; // 0 to 1, while JOINING
 }
 
+// Shares of the rays of all processed cameras.
+export interface Verdict {
+  summary?: string;
+  warning?: string;
+  coverage?: number;
+  inferred?: number; // of what is covered
+  blind?: number;
+  inconsistent?: number;
+  unsupported?: number;
+  contradicted?: number;
+}
+
 export interface Reconstruction {
   id: string;
   state: `RECONSTRUCTION_STATE_${ReconstructionState}`;
@@ -31,6 +43,8 @@ export interface Reconstruction {
   meshSha256?: string;
   stage?: string; // what is being done while PREPARING or JOINING, in words
   expectedFinishTime?: string; // while RUNNING or JOINING, as soon as something can be said
+  warnings?: string[];
+  verdict?: Verdict; // when DONE
 }
 
 // Positions are the numbers in CameraTable.states.

@@ -11,9 +11,10 @@ import { useNow } from '../components/hooks';
 import { LogCard } from '../components/log';
 import { NotifyButton, useNotification } from '../components/notification';
 import { Confirm, Notice, PageTitle, ProgressBar, StateBadge } from '../components/pieces';
+import { VerdictBar } from '../components/verdict_bar';
 import { SlowestStepWords } from '../components/slowest_step';
 import { ViewerPanel } from '../components/viewer_panel';
-import { count, duration, percent } from '../format';
+import { capitalized, count, duration, percent } from '../format';
 import { linkTo } from '../router';
 import { secondsLeft } from '../state/eta';
 import { ReconstructionStore } from '../state/reconstruction_store';
@@ -65,6 +66,7 @@ function Summary({ store, reconstruction }: { store: ReconstructionStore; recons
         <Fact name={isOver(state) ? 'Took' : 'Running for'} value={duration(Math.max(0, (end - start) / 1000))} />
         {left !== null && <Fact name="Left" value={`about ${duration(left)}`} title="Until the mesh is there" />}
       </dl>
+      {reconstruction.verdict !== undefined && <VerdictBar verdict={reconstruction.verdict} />}
       {first !== null && (
         <p class="muted small">
           <SlowestStepWords held={first} name={name} now={now} />
@@ -156,6 +158,14 @@ export default function ReconstructionPage({ id }: { id: string }) {
       {store?.missing.value && <Notice tone="danger">There is no reconstruction “{id}” here.</Notice>}
       {failure !== '' && <Notice tone="danger">{failure}</Notice>}
       {(reconstruction?.stage ?? '') !== '' && <Notice>{reconstruction!.stage}</Notice>}
+      {(reconstruction?.warnings ?? []).map((warning) => (
+        <Notice key={warning} tone="warning">
+          {warning}
+        </Notice>
+      ))}
+      {(reconstruction?.verdict?.warning ?? '') !== '' && (
+        <Notice tone="warning">{capitalized(reconstruction!.verdict!.warning!)}.</Notice>
+      )}
       {state === 'FAILED' && <Notice tone="danger">It failed: {reconstruction!.failure}</Notice>}
       {store !== null && !store.missing.value && (
         <div class="reconstruction">

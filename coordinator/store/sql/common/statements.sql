@@ -18,21 +18,21 @@ VALUES (:id, :options_json, :scene_digest, :state, :now, :reason, :weight_thousa
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
        cameras_in_flight, patches_filtered, patches_accepted, owner, method_version, joined_thousandths,
-       expected_end_at
+       expected_end_at, verdict_json
 FROM reconstructions WHERE id = :id;
 
 -- name: list_reconstructions
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
        cameras_in_flight, patches_filtered, patches_accepted, owner, method_version, joined_thousandths,
-       expected_end_at
+       expected_end_at, verdict_json
 FROM reconstructions WHERE id > :after AND state <> 'deleting' ORDER BY id LIMIT :limit;
 
 -- name: list_reconstructions_of
 SELECT id, options_json, scene_digest, state, state_reason, weight_thousandths, scene_reference, scene_blob, created_at,
        finished_at, mesh_digest, mesh_bytes, vertices, faces, cameras_total, cameras_committed, cameras_set_aside,
        cameras_in_flight, patches_filtered, patches_accepted, owner, method_version, joined_thousandths,
-       expected_end_at
+       expected_end_at, verdict_json
 FROM reconstructions WHERE owner = :owner AND id > :after AND state <> 'deleting' ORDER BY id LIMIT :limit;
 
 -- name: usage_of
@@ -63,7 +63,7 @@ WHERE id = :id AND state NOT IN ('done', 'cancelled', 'failed', 'deleting')
 -- name: finish_reconstruction
 UPDATE reconstructions
 SET state = 'done', finished_at = :now, mesh_digest = :mesh_digest, mesh_bytes = :mesh_bytes, vertices = :vertices,
-    faces = :faces
+    faces = :faces, verdict_json = :verdict_json
 WHERE id = :id AND state NOT IN ('done', 'cancelled', 'failed', 'deleting')
   AND EXISTS (SELECT 1 FROM conductor_leases
               WHERE reconstruction_id = :id AND epoch = :conductor_epoch /*postgres: FOR SHARE */);

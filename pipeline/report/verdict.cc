@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pipeline/local/verdict.h"
+#include "pipeline/report/verdict.h"
 
 #include <algorithm>
 #include <cmath>

@@ -16,8 +16,7 @@ inline constexpr double kCamerasOffPx = 0.2;
 
 // What a run came to. Adds to each processed camera of `cameras` (the "cameras" of MakeCamerasReport) what has become
 // of its rays ("fate", shares of them), and how far its picture and those of its targets lie apart across epipolar
-// lines
-// ("off_px", null where too little was measured). Gives
+// lines ("off_px", null where too little was measured). Gives
 // {"coverage", "inferred", "blind", "inconsistent", "unsupported", "contradicted", "least_covered", "cameras_off_px"},
 // the shares over the rays of all processed cameras: coverage: shows surface that was there before or that this camera
 // found and others confirm; inferred: of that, what only the planes around textureless holes say; blind: nothing there
