@@ -139,11 +139,11 @@ class ConductorTest : public testing::Test {
 
   // What a worker says, before anybody looks at it.
   absl::Status Report(const CameraJobSpec& spec, const std::string& digest,
-                      const std::vector<CameraIndex>& weak_targets = {}) {
+                      const std::vector<CameraIndex>& weak_targets = {}, const std::string& report_json = "{}") {
     JobChange change = ChangeOf(JobChange::Kind::kComplete, spec.sequence, spec.epoch);
     change.filtered_digest = digest;
     change.weak_targets = weak_targets;
-    change.report_json = "{}";
+    change.report_json = report_json;
     return Change(change).status;
   }
 
@@ -261,6 +261,33 @@ TEST_F(ConductorTest, JobsSeeExactlyTheSurfacesOfTheirSnapshot) {
       EXPECT_GT(again[i].epoch, held[i].epoch);
     }
     held = again;
+  }
+}
+
+// Jobs of ten seconds, one after the other: what is foretold is what is left of them, also by a process that goes on.
+TEST_F(ConductorTest, TheEndIsForetoldByWhatJobsTook) {
+  constexpr absl::Duration kJob = absl::Seconds(10);
+  StartAnew("run", {});
+  const auto expected_end = [&] { return loop_->conductor().progress().expected_end; };
+  EXPECT_EQ(expected_end(), absl::InfinitePast()) << "nothing is known yet";
+  std::vector<CameraJobSpec> held = TakeJobs();
+  while (!finished()) {
+    ASSERT_FALSE(held.empty());
+    clock_.Advance(kJob);
+    ASSERT_TRUE(Report(held.front(), PutFiltered(held.front()), {}, R"({"seconds": {"loading": 10}})").ok());
+    ASSERT_TRUE(loop_->Step().ok());
+    held.erase(held.begin());
+    const auto left = static_cast<double>(10 - committed());
+    if (committed() == 5) {
+      OpenLoop();
+      held.clear();
+      EXPECT_EQ(expected_end(), absl::InfinitePast()) << "how many work at it now is not known yet";
+    } else if (left > 0 && committed() > 1) {
+      const double foretold = absl::FDivDuration(expected_end() - clock_.Now(), kJob);
+      EXPECT_GE(foretold, 0.7 * left) << committed();
+      EXPECT_LE(foretold, 1.4 * left) << committed();
+    }
+    for (CameraJobSpec& spec : TakeJobs()) held.push_back(std::move(spec));
   }
 }
 

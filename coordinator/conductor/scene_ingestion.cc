@@ -88,7 +88,10 @@ absl::Status CheckPhotographs(const Scene& scene, const fs::path& root) {
 
 // The same error, which calls files by their paths in the folder.
 absl::Status Inside(const std::string& folder, const absl::Status& status) {
-  absl::Status inside(status.code(), absl::StrReplaceAll(status.message(), {{folder + "/", ""}}));
+  // The folder itself, as one of several places, is ".".
+  absl::Status inside(
+      status.code(),
+      absl::StrReplaceAll(status.message(), {{folder + "/;", ".;"}, {folder + "/,", ".,"}, {folder + "/", ""}}));
   status.ForEachPayload([&](absl::string_view name, const absl::Cord& payload) { inside.SetPayload(name, payload); });
   return inside;
 }

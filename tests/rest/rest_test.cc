@@ -150,6 +150,11 @@ TEST_F(RestTest, FromAnInterruptedUploadToTheMesh) {
     EXPECT_EQ(converted->body == mesh->body, format["name"] == "ply");
   }
 
+  // What it came to.
+  const Json verdict = GetJson(base)["verdict"];
+  EXPECT_GT(verdict["coverage"].get<double>(), 0.3) << verdict;
+  EXPECT_THAT(verdict["summary"].get<std::string>(), HasSubstr("of the photographs covered"));
+
   // Levels of detail: what tileset.json names is there, and nothing else.
   const auto tileset = http_->Get(base + "/tiles/tileset.json");
   ASSERT_TRUE(tileset && tileset->status == 200) << (tileset ? tileset->body : "");
