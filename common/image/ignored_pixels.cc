@@ -19,6 +19,24 @@ IgnoredPixels::IgnoredPixels(const ColorImage& mask) : width_(mask.width), heigh
   }
 }
 
+IgnoredPixels IgnoredPixels::Halved() const {
+  IgnoredPixels half;
+  if (sums_.empty()) return half;
+  half.width_ = width_ / 2;
+  half.height_ = height_ / 2;
+  const auto row_size = static_cast<size_t>(half.width_) + 1;
+  half.sums_.assign(row_size * (static_cast<size_t>(half.height_) + 1), 0);
+  for (int y = 0; y < half.height_; ++y) {
+    uint32_t in_row = 0;
+    for (int x = 0; x < half.width_; ++x) {
+      if (AnyIn(2 * x, 2 * y, 2 * x + 1, 2 * y + 1)) ++in_row;
+      const size_t here = (static_cast<size_t>(y) + 1) * row_size + static_cast<size_t>(x) + 1;
+      half.sums_[here] = half.sums_[here - row_size] + in_row;
+    }
+  }
+  return half;
+}
+
 bool IgnoredPixels::AnyIn(int x0, int y0, int x1, int y1) const {
   if (sums_.empty()) return false;
   const int left = std::clamp(x0, 0, width_);

@@ -22,6 +22,8 @@ class IgnoredPixels {
   bool At(int x, int y) const { return AnyIn(x, y, x, y); }
   // Whether any pixel from (x0, y0) to (x1, y1) is ignored, both included; what lies beyond the image does not count.
   bool AnyIn(int x0, int y0, int x1, int y1) const;
+  // Of the image of half the size, an odd last row or column left out: those with one below them.
+  IgnoredPixels Halved() const;
   int64_t count() const { return sums_.empty() ? 0 : sums_.back(); }
   int64_t bytes() const { return static_cast<int64_t>(sums_.size() * sizeof(uint32_t)); }
 

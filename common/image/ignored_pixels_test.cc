@@ -45,5 +45,17 @@ TEST(IgnoredPixelsTest, TheBrightestChannelCounts) {
   EXPECT_EQ(BlackAndWhite(mask, 128).rgb, std::vector<uint8_t>(9, 0));
 }
 
+TEST(IgnoredPixelsTest, HalvedIgnoresWhatHasOneBelowIt) {
+  ColorImage mask = White(7, 5);
+  for (const auto& [x, y] : {std::pair{2, 1}, {6, 0}, {0, 3}}) mask.rgb[3 * static_cast<size_t>(7 * y + x)] = 0;
+  const IgnoredPixels half = IgnoredPixels(mask).Halved();
+  EXPECT_EQ(half.count(), 2) << "the odd last column is left out";
+  EXPECT_TRUE(half.At(1, 0));
+  EXPECT_TRUE(half.At(0, 1));
+  EXPECT_FALSE(half.AnyIn(2, 0, 2, 1));
+  EXPECT_FALSE(half.At(0, 0));
+  EXPECT_FALSE(IgnoredPixels().Halved());
+}
+
 }  // namespace
 }  // namespace meshwright

@@ -8,6 +8,7 @@
 #include "common/base/clock.h"
 #include "common/base/out_of_range.h"
 #include "common/base/status_macros.h"
+#include "worker/camera_job/smaller_photographs.h"
 #include "worker/completion/completion.h"
 #include "worker/filtering/epipolar_offsets.h"
 
@@ -15,6 +16,8 @@ namespace meshwright {
 namespace {
 
 constexpr int kWidestLattice = 16;  // px
+
+}  // namespace
 
 std::vector<SparsePointObservation> ObservationsOf(const CameraJobInput& input) {
   std::vector<SparsePointObservation> observations;
@@ -31,14 +34,13 @@ std::vector<SparsePointObservation> ObservationsOf(const CameraJobInput& input) 
   return observations;
 }
 
-}  // namespace
-
 absl::Status CameraJobOptions::Validate() const {
   if (lattice_step < 1 || lattice_step > 16) return OutOfRange("lattice_step", lattice_step, "1..16 px");
   MW_RETURN_IF_ERROR(scoring.Validate());
   MW_RETURN_IF_ERROR(seeding.Validate());
   MW_RETURN_IF_ERROR(growing.Validate());
   MW_RETURN_IF_ERROR(filtering.Validate());
+  if (halvings < 0 || halvings > 4) return OutOfRange("halvings", halvings, "0..4");
   return completion.Validate();
 }
 
@@ -100,8 +102,11 @@ CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJo
   report.epipolar_squares = offsets.sum_of_squares;
   report.epipolar_measurements = offsets.measurements;
 
-  // Ours: planes close what photographs are blind for.
-  report.rays_inferred = CompleteSurface(scorer, input.accepted, options.completion, filtering.surface, pool);
+  // Ours: smaller photographs, then planes, close what photographs are blind for.
+  const std::vector<PatchPlane> on_smaller =
+      GrowOnSmallerPhotographs(input, options, filtering.surface, report.tentative_patches_scored, pool);
+  report.rays_inferred =
+      CompleteSurface(scorer, input.accepted, on_smaller, options.completion, filtering.surface, pool);
   result.filtered =
       MakeFilteredSurface(filtering.surface, input.reference.camera_index, reference, *input.reference_color);
   report.rays_filtered = result.filtered.CountPatches() - report.rays_inferred;
@@ -115,7 +120,12 @@ int64_t EstimateCameraJobBytes(const Camera& reference, const CameraJobOptions& 
   constexpr int64_t kPatchesPerRay = 2;
   constexpr int64_t kBytesPerPatch = 2 * sizeof(GrownPatch) + 64;
   constexpr int64_t kBytesPerNode = 64;
-  return nodes * (kPatchesPerRay * kBytesPerPatch + kBytesPerNode);
+  // All views once more at half the size, with the sizes below: 4 bytes for each of a third of their pixels and ninth.
+  constexpr int64_t kBytesPerPixelOfSmaller = 4 * (kMaxTargets + 1) * 4 / 9;
+  // What has grown at full size is there while on smaller photographs a third of it grows.
+  const int64_t at_full_size = nodes * (kPatchesPerRay * kBytesPerPatch + kBytesPerNode);
+  if (options.halvings == 0) return at_full_size;
+  return at_full_size * 4 / 3 + kBytesPerPixelOfSmaller * reference.width * reference.height;
 }
 
 CameraJobOptions Reduced(CameraJobOptions options, int reduction) {

@@ -34,6 +34,7 @@ struct CameraJobOptions {
   GrowingOptions growing;
   FilteringOptions filtering;
   CompletionOptions completion;
+  int halvings = 2;  // where nothing is found photographs are compared at half their size, so many times, 0..4
 
   absl::Status Validate() const;
 };
@@ -66,9 +67,10 @@ struct CameraJobReport {
   int64_t seeds_from_points = 0;
   int64_t tentative_patches_scored = 0;
   int64_t patches_grown = 0;
-  int64_t rays_grown = 0;       // rays with at least one grown patch
-  int64_t rays_filtered = 0;    // rays with a patch that filtering left
-  int64_t rays_inferred = 0;    // rays that got their patch from the plane around them: F_r has both
+  int64_t rays_grown = 0;     // rays with at least one grown patch
+  int64_t rays_filtered = 0;  // rays with a patch that filtering left
+  int64_t rays_inferred =
+      0;  // rays that got their patch from smaller photographs or the plane around them: F_r has both
   double epipolar_squares = 0;  // of offsets across epipolar lines, px^2 summed over epipolar_measurements
   int64_t epipolar_measurements = 0;
   double mrf_energy = 0;
@@ -94,6 +96,9 @@ CameraJobResult RunCameraJob(const CameraJobInput& input, const CameraJobOptions
 // The same; `grown` gets G_r, for who wants to see what filtering chose from.
 CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJobOptions& options, PatchStacks& grown,
                                      ThreadPool& pool);
+
+// The sparse points with the targets that saw them.
+std::vector<SparsePointObservation> ObservationsOf(const CameraJobInput& input);
 
 // What the job compares photographs with.
 PatchScorer MakeScorer(const CameraJobInput& input, const PatchScorer::Options& options);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -195,6 +196,67 @@ TEST_F(CameraJobTest, OptionsAreCheckedWithThoseOfTheStages) {
   CameraJobOptions options;
   options.growing.max_patches_per_ray = 0;
   EXPECT_EQ(options.Validate().message(), "growing.max_patches_per_ray is 0, expected 1..32");
+}
+
+// Noise hides at full size what is still to be seen on photographs of half the size.
+TEST_F(CameraJobTest, SmallerPhotographsShowWhatNoiseHides) {
+  std::mt19937 generator(7);
+  std::normal_distribution<float> noise(0, 18);
+  CameraJobInput input = Input(views_->targets);
+  const auto add_noise = [&](JobView& view) {
+    GreyImage grey = ToGrey(views_->scene.images[static_cast<size_t>(view.camera_index)]);
+    for (uint8_t& value : grey.grey) {
+      value = static_cast<uint8_t>(std::clamp(static_cast<float>(value) + noise(generator), 0.0F, 255.0F));
+    }
+    view.grey = std::make_shared<SamplingImage>(grey, 3);
+  };
+  add_noise(input.reference);
+  for (JobView& target : input.targets) add_noise(target);
+  ThreadPool pool(2);
+  const auto run = [&](int halvings) {
+    CameraJobOptions options = {.lattice_step = kStep, .completion = {.max_reach = 0}};
+    options.halvings = halvings;
+    return RunCameraJob(input, options, pool);
+  };
+  const CameraJobResult full = run(0);
+  EXPECT_EQ(full.report.rays_inferred, 0);
+  const CameraJobResult smaller = run(2);
+  EXPECT_EQ(smaller.report.rays_filtered, full.report.rays_filtered) << "what is found at full size stays";
+  EXPECT_GT(smaller.report.rays_inferred, full.report.rays_filtered / 4);
+  int64_t near = 0;
+  for (int64_t node = 0; node < views_->lattice.nodes(); ++node) {
+    const auto i = static_cast<size_t>(node);
+    if (!smaller.filtered.HasPatch(node)) continue;
+    if (full.filtered.HasPatch(node)) {
+      EXPECT_EQ(smaller.filtered.depth[i], full.filtered.depth[i]);
+      EXPECT_FALSE(smaller.filtered.IsInferred(node));
+      continue;
+    }
+    EXPECT_TRUE(smaller.filtered.IsInferred(node));
+    near += views_->ErrorInSteps(node, 1 / smaller.filtered.depth[i]) < 2 ? 1 : 0;
+  }
+  EXPECT_GT(static_cast<double>(near), 0.8 * static_cast<double>(smaller.report.rays_inferred));
+}
+
+// Nor beyond a mask, nor where something is accepted.
+TEST_F(CameraJobTest, SmallerPhotographsKeepToMasksAndToWhatIsAccepted) {
+  CameraJobInput input = Input(views_->targets);
+  const ColorImage& image = views_->scene.images[static_cast<size_t>(views_->reference)];
+  ColorImage mask{image.width, image.height, std::vector<uint8_t>(image.rgb.size(), 255)};
+  for (size_t k = 0; k < mask.rgb.size(); ++k) {
+    if (k / 3 % static_cast<size_t>(image.width) >= static_cast<size_t>(image.width) / 2) mask.rgb[k] = 0;
+  }
+  input.reference.grey = std::make_shared<SamplingImage>(ToGrey(image), 3, IgnoredPixels(mask));
+  for (int64_t node = 0; node < views_->lattice.nodes(); ++node) {
+    const auto i = static_cast<size_t>(node);
+    if (node % views_->lattice.columns < views_->lattice.columns / 4) input.accepted.depth[i] = views_->truth.depth[i];
+  }
+  const CameraJobResult result = Run(input);
+  for (int64_t node = 0; node < views_->lattice.nodes(); ++node) {
+    if (!result.filtered.HasPatch(node)) continue;
+    EXPECT_LT(node % views_->lattice.columns, views_->lattice.columns / 2);
+    if (result.filtered.IsInferred(node)) EXPECT_EQ(input.accepted.depth[static_cast<size_t>(node)], 0);
+  }
 }
 
 }  // namespace

@@ -277,11 +277,11 @@ absl::Status CompletionOptions::Validate() const {
   return absl::OkStatus();
 }
 
-int64_t CompleteSurface(const PatchScorer& scorer, const AcceptedDepth& accepted, const CompletionOptions& options,
-                        SurfaceEstimate& surface, ThreadPool& pool) {
-  if (options.max_reach == 0) return 0;
+int64_t CompleteSurface(const PatchScorer& scorer, const AcceptedDepth& accepted, const std::vector<PatchPlane>& found,
+                        const CompletionOptions& options, SurfaceEstimate& surface, ThreadPool& pool) {
   const Lattice& lattice = surface.lattice;
   MW_CHECK(accepted.depth.size() == surface.plane.size());
+  MW_CHECK(found.size() == surface.plane.size());
   const Completer completer(scorer, accepted, options, surface);
   std::vector<PatchPlane> inferred(surface.plane.size());
   pool.ParallelFor(lattice.rows, kRowsPerPiece, [&](int64_t begin, int64_t end) {
@@ -289,6 +289,8 @@ int64_t CompleteSurface(const PatchScorer& scorer, const AcceptedDepth& accepted
       for (int column = 0; column < lattice.columns; ++column) {
         const auto node = static_cast<size_t>(lattice.Index(column, row));
         if (surface.plane[node].w > 0 || accepted.depth[node] > 0) continue;
+        inferred[node] = found[node];
+        if (inferred[node].w > 0 || options.max_reach == 0) continue;
         inferred[node] = completer.PlaneAround(column, row).value_or(PatchPlane{});
       }
     }

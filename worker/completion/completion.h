@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include <absl/status/status.h>
 
@@ -28,7 +29,10 @@ struct CompletionOptions {
 //
 // An inferred patch has quality 0 and Sigma empty; acceptance asks for another camera that finds the same, gives it no
 // say about what was measured, and puts it behind all that was (AcceptSurface, JudgeAgain). Returns how many there are.
-int64_t CompleteSurface(const PatchScorer& scorer, const AcceptedDepth& accepted, const CompletionOptions& options,
-                        SurfaceEstimate& surface, ThreadPool& pool);
+//
+// `found`, per node, w = 0 for none: planes that are known otherwise and no better (GrowOnSmallerPhotographs). They
+// come first, and are no surface that anything is inferred from.
+int64_t CompleteSurface(const PatchScorer& scorer, const AcceptedDepth& accepted, const std::vector<PatchPlane>& found,
+                        const CompletionOptions& options, SurfaceEstimate& surface, ThreadPool& pool);
 
 }  // namespace meshwright

@@ -56,7 +56,7 @@ class CompleteSurfaceTest : public testing::Test {
     PatchScorer::Options scoring;
     const PatchScorer scorer({camera_, std::make_shared<SamplingImage>(grey_, 1)}, {}, scoring, region_);
     ThreadPool pool(threads);
-    return CompleteSurface(scorer, accepted_, options, surface_, pool);
+    return CompleteSurface(scorer, accepted_, std::vector<PatchPlane>(surface_.plane.size()), options, surface_, pool);
   }
 
   void Paint(int x, int y, uint8_t grey) {

@@ -20,9 +20,6 @@ constexpr float kMinStepGain = 1e-6F;
 constexpr float kMinUncertainty = 0.02F;
 constexpr float kMaxUncertainty = 4;
 constexpr float kUnrefinedUncertainty = 1;
-// A depth that is less certain is dropped, pixel footprints: where there is next to no texture photo-consistency agrees
-// with itself at any depth, and neighbouring views of a dark background confirm each other's inventions.
-constexpr float kMaxKeptUncertainty = 2;
 
 // The targets that may vote, and their mean score.
 struct Voters {
@@ -70,6 +67,7 @@ absl::Status RefinementOptions::Validate() const {
   if (smoothing_radius_steps < 0 || smoothing_radius_steps > 8) {
     return OutOfRange("refinement.smoothing_radius_steps", smoothing_radius_steps, "0..8");
   }
+  if (!(max_uncertainty_px > 0)) return OutOfRange("refinement.max_uncertainty_px", max_uncertainty_px, "> 0");
   if (!(first_step_px > 0)) return OutOfRange("refinement.first_step_px", first_step_px, "> 0");
   if (slope_radius_steps < 1 || slope_radius_steps > 8) {
     return OutOfRange("refinement.slope_radius_steps", slope_radius_steps, "1..8");
@@ -152,11 +150,11 @@ PatchPlane FitToNeighbours(const SurfaceEstimate& surface, const std::vector<Pat
   return {own.w, (syy * sx - sxy * sy) * scale, (sxx * sy - sxy * sx) * scale};
 }
 
-void DropUncertain(const std::vector<float>& uncertainty, SurfaceEstimate& surface) {
+void DropUncertain(const std::vector<float>& uncertainty, float most, SurfaceEstimate& surface) {
   const Lattice& lattice = surface.lattice;
   const auto columns = static_cast<size_t>(lattice.columns);
   for (size_t node = 0; node < uncertainty.size(); ++node) {
-    if (uncertainty[node] <= kMaxKeptUncertainty) continue;
+    if (uncertainty[node] <= most) continue;
     surface.plane[node] = {};
     surface.quality[node] = 0;
     surface.sigma[node] = 0;
@@ -200,7 +198,7 @@ int64_t RefineSurface(const PatchScorer& scorer, const RefinementOptions& option
   if (options.rounds > 0 && options.smoothing_radius_steps > 0) {
     SmoothDepth(uncertainty, scorer.reference().focal(), options.smoothing_radius_steps, surface, pool);
   }
-  DropUncertain(uncertainty, surface);
+  DropUncertain(uncertainty, static_cast<float>(options.max_uncertainty_px), surface);
   return scored;
 }
 

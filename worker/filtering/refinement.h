@@ -22,6 +22,10 @@ struct RefinementOptions {
                           // lose little and follow the surface better than those of growing
   int slope_radius_steps = 2;      // normals from linked neighbours this near, lattice steps, 1..8
   int smoothing_radius_steps = 2;  // depths are fitted to neighbours this near at most, 0 leaves them, 0..8
+  // Less certain depths are dropped, standard deviation in footprints of a pixel, > 0: where there is next to no
+  // texture photo-consistency agrees with itself at any depth, and neighbouring views of a dark background confirm each
+  // other's inventions.
+  double max_uncertainty_px = 2;
 
   absl::Status Validate() const;
 };

@@ -5,7 +5,7 @@ import { percent } from '../format';
 
 const FATES: readonly [name: keyof Verdict, color: string, words: string, title: string][] = [
   ['coverage', 'committed', 'covered', 'Surface that was there before, or that this camera found and others confirm'],
-  ['inferred', 'done', 'of it inferred', 'Textureless, closed by the plane that surrounds it'],
+  ['inferred', 'done', 'of it inferred', 'Found on smaller photographs, or closed by the plane around a textureless hole'],
   ['blind', 'waiting', 'matched nothing', 'Nothing there looked alike in other photographs'],
   ['inconsistent', 'assigned', 'inconsistent', 'What grew there did not hold together'],
   ['unsupported', 'lost', 'unconfirmed', 'No other camera found the same'],
