@@ -19,9 +19,9 @@ inline constexpr double kCamerasOffPx = 0.2;
 // lines ("off_px", null where too little was measured). Gives
 // {"coverage", "inferred", "blind", "inconsistent", "unsupported", "contradicted", "least_covered", "cameras_off_px"},
 // the shares over the rays of all processed cameras: coverage: shows surface that was there before or that this camera
-// found and others confirm; inferred: of that, what only smaller photographs or the planes around textureless holes say;
-// blind: nothing there looked alike in other photographs; inconsistent: what grew there did not hold together; unsupported: no other
-// camera found the same; contradicted: as many look through it.
+// found and others confirm; inferred: of that, what only smaller photographs or the planes around textureless holes
+// say; blind: nothing there looked alike in other photographs; inconsistent: what grew there did not hold together;
+// unsupported: no other camera found the same; contradicted: as many look through it.
 nlohmann::ordered_json MakeVerdict(const std::vector<JudgedCamera>& judged, nlohmann::ordered_json& cameras);
 
 // A line for people: where the rays went.
