@@ -4,19 +4,29 @@
 #include <algorithm>
 
 namespace meshwright {
+namespace {
+
+// How many pixels above and left of each (x, y) are ignored, (width + 1) * (height + 1).
+template <typename IsIgnored>
+std::vector<uint32_t> SumUp(int width, int height, const IsIgnored& is_ignored) {
+  const auto row_size = static_cast<size_t>(width) + 1;
+  std::vector<uint32_t> sums(row_size * (static_cast<size_t>(height) + 1), 0);
+  for (int y = 0; y < height; ++y) {
+    uint32_t in_row = 0;
+    for (int x = 0; x < width; ++x) {
+      if (is_ignored(x, y)) ++in_row;
+      const size_t here = (static_cast<size_t>(y) + 1) * row_size + static_cast<size_t>(x) + 1;
+      sums[here] = sums[here - row_size] + in_row;
+    }
+  }
+  return sums;
+}
+
+}  // namespace
 
 IgnoredPixels::IgnoredPixels(const ColorImage& mask) : width_(mask.width), height_(mask.height) {
   if (std::all_of(mask.rgb.begin(), mask.rgb.end(), [](uint8_t sample) { return sample == 255; })) return;
-  const auto row_size = static_cast<size_t>(width_) + 1;
-  sums_.assign(row_size * (static_cast<size_t>(height_) + 1), 0);
-  for (int y = 0; y < height_; ++y) {
-    uint32_t in_row = 0;
-    for (int x = 0; x < width_; ++x) {
-      if (mask.At(x, y) != std::array<uint8_t, 3>{255, 255, 255}) ++in_row;
-      const size_t here = (static_cast<size_t>(y) + 1) * row_size + static_cast<size_t>(x) + 1;
-      sums_[here] = sums_[here - row_size] + in_row;
-    }
-  }
+  sums_ = SumUp(width_, height_, [&](int x, int y) { return mask.At(x, y) != std::array<uint8_t, 3>{255, 255, 255}; });
 }
 
 IgnoredPixels IgnoredPixels::Halved() const {
@@ -24,16 +34,8 @@ IgnoredPixels IgnoredPixels::Halved() const {
   if (sums_.empty()) return half;
   half.width_ = width_ / 2;
   half.height_ = height_ / 2;
-  const auto row_size = static_cast<size_t>(half.width_) + 1;
-  half.sums_.assign(row_size * (static_cast<size_t>(half.height_) + 1), 0);
-  for (int y = 0; y < half.height_; ++y) {
-    uint32_t in_row = 0;
-    for (int x = 0; x < half.width_; ++x) {
-      if (AnyIn(2 * x, 2 * y, 2 * x + 1, 2 * y + 1)) ++in_row;
-      const size_t here = (static_cast<size_t>(y) + 1) * row_size + static_cast<size_t>(x) + 1;
-      half.sums_[here] = half.sums_[here - row_size] + in_row;
-    }
-  }
+  half.sums_ =
+      SumUp(half.width_, half.height_, [&](int x, int y) { return AnyIn(2 * x, 2 * y, 2 * x + 1, 2 * y + 1); });
   return half;
 }
 

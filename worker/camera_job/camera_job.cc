@@ -104,7 +104,7 @@ CameraJobResult RunFollowedCameraJob(const CameraJobInput& input, const CameraJo
 
   // Ours: smaller photographs, then planes, close what photographs are blind for.
   const std::vector<PatchPlane> on_smaller =
-      GrowOnSmallerPhotographs(input, options, filtering.surface, report.tentative_patches_scored, pool);
+      GrowOnSmallerPhotographs(input, scorer, options, filtering.surface, report.tentative_patches_scored, pool);
   report.rays_inferred =
       CompleteSurface(scorer, input.accepted, on_smaller, options.completion, filtering.surface, pool);
   result.filtered =

@@ -42,8 +42,9 @@ PatchPlane OnFull(const PatchPlane& plane) { return {plane.w, plane.gx / 2, plan
 
 class SmallerJob {
  public:
-  SmallerJob(const CameraJobInput& input, const CameraJobOptions& options, const SurfaceEstimate& surface)
-      : input_(input), options_(options), surface_(surface) {
+  SmallerJob(const CameraJobInput& input, const PatchScorer& full_scorer, const CameraJobOptions& options,
+             const SurfaceEstimate& surface)
+      : input_(input), full_scorer_(full_scorer), options_(options), surface_(surface) {
     half_.reference = Halved(input.reference);
     for (const JobView& target : input.targets) half_.targets.push_back(Halved(target));
     half_.sparse_points = input.sparse_points;
@@ -70,7 +71,7 @@ class SmallerJob {
     PatchScorer::Options fine_scoring = options_.scoring;
     fine_scoring.window_radius = next.filtering.refinement.window_radius;
     scored += RefineSurface(MakeScorer(half_, fine_scoring), next.filtering.refinement, filtering.surface, pool);
-    std::vector<PatchPlane> found = GrowOnSmallerPhotographs(half_, next, filtering.surface, scored, pool);
+    std::vector<PatchPlane> found = GrowOnSmallerPhotographs(half_, scorer, next, filtering.surface, scored, pool);
     for (size_t i = 0; i < found.size(); ++i) {
       if (filtering.surface.plane[i].w > 0) found[i] = filtering.surface.plane[i];
     }
@@ -138,7 +139,6 @@ class SmallerJob {
   }
 
   std::vector<PatchPlane> AtFullSize(const std::vector<PatchPlane>& found) const {
-    const PatchScorer scorer = MakeScorer(input_, options_.scoring);
     std::vector<PatchPlane> planes(surface_.plane.size());
     PatchScorer::Window window;
     for (int64_t node = 0; node < surface_.lattice.nodes(); ++node) {
@@ -147,7 +147,7 @@ class SmallerJob {
       const Eigen::Vector2f moved = FromSmaller(smaller, node);
       const PatchPlane plane = OnFull(found[static_cast<size_t>(smaller)].MovedBy(moved.x(), moved.y()));
       const Eigen::Vector2d pixel = Pixel(node);
-      scorer.MakeWindow(static_cast<int>(pixel.x()), static_cast<int>(pixel.y()), window);
+      full_scorer_.MakeWindow(static_cast<int>(pixel.x()), static_cast<int>(pixel.y()), window);
       const bool may_be = window.may_hold_surface && !window.may_show_backdrop && plane.w > 0 &&
                           plane.w >= window.min_w && plane.w <= window.max_w;
       if (may_be) planes[static_cast<size_t>(node)] = plane;
@@ -156,6 +156,7 @@ class SmallerJob {
   }
 
   const CameraJobInput& input_;
+  const PatchScorer& full_scorer_;
   const CameraJobOptions& options_;
   const SurfaceEstimate& surface_;
   CameraJobInput half_;
@@ -164,13 +165,14 @@ class SmallerJob {
 
 }  // namespace
 
-std::vector<PatchPlane> GrowOnSmallerPhotographs(const CameraJobInput& input, const CameraJobOptions& options,
-                                                 const SurfaceEstimate& surface, int64_t& scored, ThreadPool& pool) {
+std::vector<PatchPlane> GrowOnSmallerPhotographs(const CameraJobInput& input, const PatchScorer& scorer,
+                                                 const CameraJobOptions& options, const SurfaceEstimate& surface,
+                                                 int64_t& scored, ThreadPool& pool) {
   const auto can_be_halved = [](const JobView& view) { return view.grey->level_count() > 1; };
   const bool goes_on = options.halvings > 0 && can_be_halved(input.reference) && !input.targets.empty() &&
                        std::all_of(input.targets.begin(), input.targets.end(), can_be_halved);
   if (!goes_on) return std::vector<PatchPlane>(surface.plane.size());
-  return SmallerJob(input, options, surface).Run(scored, pool);
+  return SmallerJob(input, scorer, options, surface).Run(scored, pool);
 }
 
 }  // namespace meshwright

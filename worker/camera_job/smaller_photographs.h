@@ -19,7 +19,9 @@ namespace meshwright {
 // Gives for each node of `surface` the plane that was found, w = 0 for none. They are less accurate than the others,
 // and reach over silhouettes a little: CompleteSurface makes them patches that have no say. `scored` gets the number of
 // tentative patches.
-std::vector<PatchPlane> GrowOnSmallerPhotographs(const CameraJobInput& input, const CameraJobOptions& options,
-                                                 const SurfaceEstimate& surface, int64_t& scored, ThreadPool& pool);
+// `scorer`: of `input` at full size.
+std::vector<PatchPlane> GrowOnSmallerPhotographs(const CameraJobInput& input, const PatchScorer& scorer,
+                                                 const CameraJobOptions& options, const SurfaceEstimate& surface,
+                                                 int64_t& scored, ThreadPool& pool);
 
 }  // namespace meshwright
