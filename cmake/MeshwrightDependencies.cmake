@@ -14,6 +14,7 @@ find_package(PostgreSQL REQUIRED)
 find_package(CURL REQUIRED)
 find_package(Boost 1.81 REQUIRED)  # Asio and Beast: headers alone
 find_package(meshoptimizer REQUIRED)
+find_package(Qhull REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(EXPAT REQUIRED)
 find_package(CLI11 REQUIRED)

@@ -104,7 +104,7 @@ set(CPACK_DEBIAN_DEV_PACKAGE_NAME libmeshwright-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libabsl-dev, libeigen3-dev (>= 3.4), libexpat1-dev, libhwy-dev, libjpeg-dev, libmeshoptimizer-dev, \
-libpng-dev, libsqlite3-dev, libssl-dev, zlib1g-dev")
+libpng-dev, libqhull-dev, libsqlite3-dev, libssl-dev, zlib1g-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "multi-view stereo as a C++ library
 Headers, the static library and the CMake package Meshwright: a reconstruction
 in the process of another program.")

@@ -3,6 +3,6 @@
 
 namespace meshwright {
 
-const int kMethodVersion = 5;
+const int kMethodVersion = 6;
 
 }  // namespace meshwright

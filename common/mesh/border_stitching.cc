@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <mutex>
 #include <queue>
@@ -202,28 +203,37 @@ bool BorderStitcher::InGap(int32_t corner, int32_t vertex, const Scope& scope) c
   return InSector(NormalFor(at.vertex, scope), Position(previous) - x, Position(vertex) - x, Position(next) - x);
 }
 
-bool BorderStitcher::Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope,
-                          const Scratch& scratch) const {
+bool BorderStitcher::FitsGaps(int32_t edge, int32_t corner, const Scope& scope) const {
   const int32_t end = At(edge).next;
+  const int32_t a = VertexOf(edge);
+  const int32_t b = VertexOf(end);
   const int32_t c = VertexOf(corner);
   const bool after = At(end).next == corner;
   const bool before = At(edge).previous == corner;
-  if (!after && HasEdge(frame.b_vertex, c)) return false;
-  if (!before && HasEdge(frame.a_vertex, c)) return false;
+  if (!after && HasEdge(b, c)) return false;
+  if (!before && HasEdge(a, c)) return false;
+  if (!before && !InGap(edge, c, scope)) return false;
+  if (!after && !InGap(end, c, scope)) return false;
+  if (!before && !InGap(corner, a, scope)) return false;
+  if (!after && !InGap(corner, b, scope)) return false;
+  if (before || after) return true;
+  // Counter-clockwise around c: its previous vertex, b, a, its next vertex.
+  const Eigen::Vector3d x = Position(c);
+  const Eigen::Vector3d next = Position(VertexOf(At(corner).next));
+  return InSector(NormalFor(c, scope), Position(b) - x, Position(a) - x, next - x);
+}
+
+bool BorderStitcher::Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope,
+                          const Scratch& scratch) const {
+  const int32_t c = VertexOf(corner);
   const Eigen::Vector3d x = Position(c);
   const Eigen::Vector3d normal = (frame.a - frame.b).cross(x - frame.b).normalized();
   for (const int32_t v : {frame.a_vertex, frame.b_vertex, c}) {
     if (!(normal.dot(NormalFor(v, scope)) > scope.min_normal_cosine)) return false;
   }
-  if (!before && !InGap(edge, c, scope)) return false;
-  if (!after && !InGap(end, c, scope)) return false;
-  if (!before && !InGap(corner, frame.a_vertex, scope)) return false;
-  if (!after && !InGap(corner, frame.b_vertex, scope)) return false;
-  if (!before && !after) {
-    // Counter-clockwise around c: its previous vertex, b, a, its next vertex.
-    const Eigen::Vector3d next = Position(VertexOf(At(corner).next));
-    if (!InSector(NormalFor(c, scope), frame.b - x, frame.a - x, next - x)) return false;
-  }
+  if (!FitsGaps(edge, corner, scope)) return false;
+  const bool after = At(At(edge).next).next == corner;
+  const bool before = At(edge).previous == corner;
   const Eigen::Vector2d at = frame.Project(x);
   if (!before && IsBlocked(scratch.blockers, {{0, 0}, at, frame.a_vertex, c})) return false;
   return after || !IsBlocked(scratch.blockers, {frame.Project(frame.b), at, frame.b_vertex, c});
@@ -560,6 +570,75 @@ int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>&
   return std::ranges::count_if(holes, [&](const Hole& hole) {
     return std::ranges::none_of(hole.corners, [&](int32_t corner) { return At(corner).open; });
   });
+}
+
+std::pair<int32_t, int32_t> BorderStitcher::PlaceFor(const Face& triangle) const {
+  for (size_t k = 0; k < 3; ++k) {
+    // A triangle runs along an open edge from its end to its start.
+    const int32_t b = triangle[k];
+    const int32_t a = triangle[(k + 1) % 3];
+    const int32_t c = triangle[(k + 2) % 3];
+    const Eigen::Vector3d normal = (Position(a) - Position(b)).cross(Position(c) - Position(b));
+    if (!(normal.dot(Normal(a) + Normal(b) + Normal(c)) > 0)) continue;  // it would fold over
+    for (int32_t edge = a; edge >= 0; edge = At(edge).sibling) {
+      if (!At(edge).open || VertexOf(At(edge).next) != b) continue;
+      for (int32_t corner = c; corner >= 0; corner = At(corner).sibling) {
+        if (!At(corner).open) continue;
+        const bool after = At(At(edge).next).next == corner;
+        const bool before = At(edge).previous == corner;
+        if ((!after && HasEdge(b, c)) || (!before && HasEdge(a, c))) continue;
+        // Which of several gaps it lies in is to be seen; a vertex with one has no choice, however its rim is turned.
+        const bool has_choice = open_at_vertex_[static_cast<size_t>(c)] > 1 && !after && !before;
+        if (!has_choice || FitsGaps(edge, corner, {})) return {edge, corner};
+      }
+    }
+  }
+  return {-1, -1};
+}
+
+int64_t BorderStitcher::SewOn(absl::Span<const Face> triangles) {
+  std::vector<std::pair<double, size_t>> by_size;
+  absl::flat_hash_map<std::pair<int32_t, int32_t>, std::vector<size_t>> at_edge;  // ranks, by undirected edges
+  for (size_t i = 0; i < triangles.size(); ++i) {
+    double longest = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      longest =
+          std::max(longest, (Position(triangles[i][k]) - Position(triangles[i][(k + 1) % 3])).squaredNorm());
+    }
+    by_size.emplace_back(longest, i);
+  }
+  std::ranges::sort(by_size);
+  std::priority_queue<size_t, std::vector<size_t>, std::greater<>> ranks;
+  for (size_t rank = 0; rank < by_size.size(); ++rank) {
+    const Face& triangle = triangles[by_size[rank].second];
+    for (size_t k = 0; k < 3; ++k) {
+      at_edge[std::minmax(triangle[k], triangle[(k + 1) % 3])].push_back(rank);
+    }
+    ranks.push(rank);
+  }
+  std::vector<uint8_t> is_sewn(triangles.size(), 0);
+  std::vector<int32_t> changed;
+  int64_t count = 0;
+  while (!ranks.empty()) {
+    const size_t rank = ranks.top();
+    ranks.pop();
+    if (is_sewn[rank] != 0) continue;
+    const auto [edge, corner] = PlaceFor(triangles[by_size[rank].second]);
+    if (edge < 0) continue;
+    Apply(edge, corner, changed);
+    is_sewn[rank] = 1;
+    ++count;
+    // What lies along its edges may have its place now.
+    for (const int32_t open : changed) {
+      if (!At(open).open) continue;
+      const auto waiting = at_edge.find(std::minmax(VertexOf(open), VertexOf(At(open).next)));
+      if (waiting == at_edge.end()) continue;
+      for (const size_t other : waiting->second) {
+        if (is_sewn[other] == 0) ranks.push(other);
+      }
+    }
+  }
+  return count;
 }
 
 }  // namespace meshwright

@@ -50,6 +50,11 @@ class BorderStitcher {
   // slits whatever their rims look like, wider holes where the rims are nearly flat. Returns how many.
   int64_t FillHoles(double max_width, const std::function<void()>& step);
 
+  // Adds those of the triangles that can be sewn on one after the other, the smallest first. Returns how many.
+  int64_t SewOn(absl::Span<const Face> triangles);
+
+  // Whether a gap starts at the vertex.
+  bool IsOpen(int32_t v) const { return open_at_vertex_[static_cast<size_t>(v)] > 0; }
   const std::vector<BorderVertex>& vertices() const { return vertices_; }
   const std::vector<Face>& faces() const { return faces_; }
   int64_t CountOpenEdges() const;
@@ -110,6 +115,10 @@ class BorderStitcher {
   std::vector<Candidate> BestForEach(absl::Span<const int32_t> edges, const Scope& scope, ThreadPool& pool,
                                      const Progress& progress);
   bool Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope, const Scratch& scratch) const;
+  // Whether the triangle over `edge` to `corner` keeps to the gaps of its corners.
+  bool FitsGaps(int32_t edge, int32_t corner, const Scope& scope) const;
+  // Where the triangle can be sewn on now: an open edge of it and the corner opposite; {-1, -1}: nowhere.
+  std::pair<int32_t, int32_t> PlaceFor(const Face& triangle) const;
   bool InGap(int32_t corner, int32_t vertex, const Scope& scope) const;
   // Outwards at a vertex.
   Eigen::Vector3d NormalFor(int32_t v, const Scope& scope) const { return scope.normal ? *scope.normal : Normal(v); }

@@ -14,7 +14,7 @@ namespace meshwright {
 using JoinListener = std::function<void(double share)>;
 
 // What joining consists of, in order.
-enum class JoinStage { kSketching, kLooking, kStitching, kWriting };
+enum class JoinStage { kSketching, kLooking, kStitching, kClosing, kWriting };
 
 // Turns steps of the stages into shares of the whole. Thread-safe.
 class JoinProgress {
@@ -35,7 +35,7 @@ class JoinProgress {
 
  private:
   // Of the time that it takes, roughly.
-  static constexpr std::array<double, 4> kShares = {0.1, 0.35, 0.3, 0.25};
+  static constexpr std::array<double, 5> kShares = {0.05, 0.2, 0.2, 0.4, 0.15};
 
   const JoinListener listener_;
   std::mutex mutex_;

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
+
+#include <absl/container/flat_hash_map.h>
 
 #include "common/base/check.h"
 #include "common/base/out_of_range.h"
@@ -15,6 +18,7 @@
 #include "common/mesh/border_stitching.h"
 #include "common/mesh/disjoint_sets.h"
 #include "common/mesh/finished_part.h"
+#include "common/mesh/gap_closing.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/seam_blending.h"
 
@@ -38,24 +42,36 @@ std::vector<uint8_t> LoneTriangles(const PartBorders& borders) {
   return lone;
 }
 
-// Per component of a part: whether what it is stitched to has too few faces. A lone triangle always has.
+// Per component of a part: whether what it is joined to edge by edge has too few faces. A lone triangle always has.
 std::vector<uint8_t> SmallComponents(const PartBorders& borders, const std::vector<BorderStitcher::Face>& faces,
                                      int64_t min_faces, int64_t& removed) {
   const size_t components = borders.faces_of_component.size();
-  DisjointSets sets(components);
-  std::vector<int64_t> total(components, 0);
-  const auto component_of = [&](int32_t v) { return borders.origins[static_cast<size_t>(v)].component; };
-  for (const auto& face : faces) {
-    sets.Join(component_of(face[0]), component_of(face[1]));
-    sets.Join(component_of(face[0]), component_of(face[2]));
+  DisjointSets sets(components + faces.size());  // components, then faces
+  absl::flat_hash_map<std::pair<int32_t, int32_t>, int32_t> face_at_edge;
+  for (size_t f = 0; f < faces.size(); ++f) {
+    const auto face = static_cast<int32_t>(components + f);
+    for (size_t k = 0; k < 3; ++k) {
+      const int32_t from = faces[f][k];
+      const int32_t to = faces[f][(k + 1) % 3];
+      // A part's border runs the other way.
+      if (borders.vertices[static_cast<size_t>(to)].next == from) {
+        sets.Join(borders.origins[static_cast<size_t>(to)].component, face);
+      } else {
+        const auto [other, is_new] = face_at_edge.try_emplace(std::minmax(from, to), face);
+        if (!is_new) sets.Join(other->second, face);
+      }
+    }
   }
-  const auto root_of = [&](size_t c) { return static_cast<size_t>(sets.Root(static_cast<int32_t>(c))); };
-  for (size_t c = 0; c < components; ++c) total[root_of(c)] += borders.faces_of_component[c];
-  for (const auto& face : faces) ++total[root_of(static_cast<size_t>(component_of(face[0])))];
+  std::vector<int64_t> total(components + faces.size(), 0);
+  for (size_t i = 0; i < total.size(); ++i) {
+    const auto root = static_cast<size_t>(sets.Root(static_cast<int32_t>(i)));
+    total[root] += i < components ? borders.faces_of_component[i] : 1;
+  }
   std::vector<uint8_t> small(components, 0);
   for (size_t c = 0; c < components; ++c) {
-    small[c] = total[root_of(c)] < std::max<int64_t>(min_faces, 2) ? 1 : 0;
-    if (small[c] != 0 && root_of(c) == c) ++removed;
+    const auto root = static_cast<size_t>(sets.Root(static_cast<int32_t>(c)));
+    small[c] = total[root] < std::max<int64_t>(min_faces, 2) ? 1 : 0;
+    if (small[c] != 0 && root == c) ++removed;
   }
   return small;
 }
@@ -190,31 +206,56 @@ std::vector<std::pair<int32_t, int32_t>> SortedEdges(const std::vector<BorderSti
   return edges;
 }
 
-Joins JoinBorders(PartBorders& borders, const JoinOptions& options, ThreadPool& pool, JoinProgress& progress,
-                  JoinedMeshCounts& counts) {
+// Stitches all but the components that are small, and finds which are. Triangles to crumbs keep others from meeting, so
+// what is left is stitched anew without them, until all that is left is large.
+BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, ThreadPool& pool,
+                        JoinProgress& progress, std::vector<uint8_t>& small, JoinedMeshCounts& counts) {
+  small.assign(borders.faces_of_component.size(), 0);
+  const std::vector<uint8_t> lone = LoneTriangles(borders);
+  std::function<void()> step = [&] { progress.Step(JoinStage::kStitching, BorderStitcher::kSteps); };
+  while (true) {
+    BorderStitcher stitcher(borders.vertices, borders.inner_edges);
+    std::vector<uint8_t> drop = lone;
+    for (size_t v = 0; v < drop.size(); ++v) {
+      if (small[static_cast<size_t>(borders.origins[v].component)] != 0) drop[v] = 1;
+    }
+    stitcher.Drop(drop);
+    stitcher.StitchNearby(kStitchReach, pool, step);
+    step = [] {};
+    int64_t removed = 0;
+    std::vector<uint8_t> now_small =
+        SmallComponents(borders, stitcher.faces(), options.min_component_faces, removed);
+    if (now_small == small) {
+      counts.components_removed = removed;
+      return stitcher;
+    }
+    small = std::move(now_small);
+  }
+}
+
+absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions& options, const LoadSurface& load,
+                                  ThreadPool& pool, JoinProgress& progress, JoinedMeshCounts& counts) {
   Joins joins;
-  const auto step = [&] { progress.Step(JoinStage::kStitching, BorderStitcher::kSteps); };
-  BorderStitcher stitcher(std::move(borders.vertices), borders.inner_edges);
-  borders.inner_edges = {};
-  stitcher.Drop(LoneTriangles(borders));
-  stitcher.StitchNearby(kStitchReach, pool, step);
-  joins.small = SmallComponents(borders, stitcher.faces(), options.min_component_faces, counts.components_removed);
-  std::vector<uint8_t> drop(borders.origins.size());
-  for (size_t v = 0; v < drop.size(); ++v) drop[v] = joins.small[static_cast<size_t>(borders.origins[v].component)];
-  stitcher.Drop(drop);
+  BorderStitcher stitcher = Stitched(borders, options, pool, progress, joins.small, counts);
   const size_t stitch_faces = stitcher.faces().size();
+  const auto step = [&] { progress.Step(JoinStage::kStitching, BorderStitcher::kSteps); };
   counts.holes_filled = stitcher.FillHoles(options.max_hole_steps, step);
+  if (options.close_reach > 0) {
+    MW_ASSIGN_OR_RETURN(const std::vector<BorderStitcher::Face> triangles,
+                        FindGapTriangles(borders, stitcher.vertices(), [&](int32_t v) { return stitcher.IsOpen(v); },
+                                         joins.small, options.close_reach, load, pool, progress));
+    counts.closing_faces = stitcher.SewOn(triangles);
+    // What it has left open is small now.
+    counts.holes_filled += stitcher.FillHoles(options.max_hole_steps, [] {});
+  }
   counts.border_edges_after = stitcher.CountOpenEdges();
 
   joins.faces = stitcher.faces();
   std::vector<uint8_t> is_stitch(joins.faces.size(), 0);
   std::fill(is_stitch.begin(), is_stitch.begin() + static_cast<int64_t>(stitch_faces), 1);
   joins.offsets = SeamOffsets(borders, stitcher.vertices(), joins.faces, is_stitch);
-  for (size_t f = 0; f < joins.faces.size(); ++f) {
-    if (drop[static_cast<size_t>(joins.faces[f][0])] != 0) continue;
-    ++(is_stitch[f] != 0 ? counts.stitch_faces : counts.hole_faces);
-  }
-  std::erase_if(joins.faces, [&](const BorderStitcher::Face& face) { return drop[static_cast<size_t>(face[0])] != 0; });
+  counts.stitch_faces = static_cast<int64_t>(stitch_faces);
+  counts.hole_faces = static_cast<int64_t>(joins.faces.size() - stitch_faces) - counts.closing_faces;
   const auto position = [&](int32_t v) { return stitcher.vertices()[static_cast<size_t>(v)].position; };
   for (const auto& face : joins.faces) {
     counts.area += TriangleArea(position(face[0]), position(face[1]), position(face[2]));
@@ -305,6 +346,7 @@ absl::Status JoinOptions::Validate() const {
   if (!(max_hole_steps >= 0 && max_hole_steps <= 1000)) {
     return OutOfRange("max_hole_steps", max_hole_steps, "0 to 1000");
   }
+  if (!(close_reach >= 0 && close_reach <= 1)) return OutOfRange("close_reach", close_reach, "0 to 1");
   if (blend_steps < 0 || blend_steps > 1000) return OutOfRange("blend_steps", blend_steps, "0 to 1000");
   if (!(simplify_footprints >= 0 && simplify_footprints <= 100)) {
     return OutOfRange("simplify_footprints", simplify_footprints, "0 to 100 pixel footprints");
@@ -326,7 +368,9 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
     patches.push_back(static_cast<int64_t>(trimmed.size()));
     counts.patches_trimmed += std::ranges::count(trimmed, true);
   }
-  const Joins joins = JoinBorders(borders, options, pool, progress, counts);
+  MW_ASSIGN_OR_RETURN(const Joins joins, JoinBorders(borders, options, load, pool, progress, counts));
+  borders.inner = {};
+  borders.inner_edges = {};
 
   MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, AttributesWith(offset)));
   PartWriter part_writer(borders, joins, writer);

@@ -19,6 +19,9 @@ struct JoinOptions {
   int64_t min_component_faces = 100;
   // Holes up to this wide with a nearly flat rim are closed. Lattice steps, 0 .. 1000.
   double max_hole_steps = 30;
+  // Gaps up to this large are closed where surface surrounds them and no camera looks through what closes them
+  // (FindGapTriangles). Share of a photograph's longer side, 0 .. 1; 0: none are.
+  double close_reach = 0.33;
   // How far from a seam the parts' colours run into each other. Lattice steps, 0 .. 1000.
   int blend_steps = 16;
   // Within each part triangles become fewer up to this error (SimplifyFaces). Pixel footprints g = z / f, the median of
@@ -37,6 +40,7 @@ struct JoinedMeshCounts {
   int64_t stitch_faces = 0;
   int64_t holes_filled = 0;
   int64_t hole_faces = 0;
+  int64_t closing_faces = 0;  // that close gaps
   int64_t components_removed = 0;
   int64_t faces_simplified = 0;  // how many fewer there are because of simplify_footprints
   double area = 0;               // of all faces, scene units squared
@@ -44,7 +48,7 @@ struct JoinedMeshCounts {
 
 // Joins the accepted surfaces 0 .. count - 1 (M_r of section 3.7, Jancosek et al. 2009, which leaves them side by side)
 // into one mesh and writes it as PLY, with `offset` added (Scene::offset). Where surfaces overlap, the earlier one
-// stays. Borders that come close are stitched, holes filled, small pieces left out, colours run into each other at the
+// stays. Borders that come close are stitched, holes filled, gaps closed, small pieces left out, colours run into each other at the
 // seams; positions stay. Parts are simplified one by one if wanted, all but their borders. Every edge has one or two
 // triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their order alone, not
 // on the threads.

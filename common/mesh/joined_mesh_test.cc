@@ -58,6 +58,7 @@ PatchLattice PlaneSeenBy(CameraIndex index, const Camera& camera, const Keep& ke
       const auto node = static_cast<size_t>(surface.lattice.Index(column, row));
       surface.depth[node] = static_cast<float>(depth);
       surface.normal_in_world[node] = Eigen::Vector3f(0, 0, center.z() > 0 ? 1 : -1);
+      surface.quality[node] = 0.9F;
       surface.rgb[node] = {grey, grey, grey};
     }
   }
@@ -300,6 +301,87 @@ TEST_F(JoinedMeshTest, HolesUpToTheLimitAreClosedAndTheRimStays) {
   EXPECT_EQ(CountLoops(BorderOf(open)), 2);
 }
 
+// Cameras from three sides see the plane but for a hole 12 steps wide.
+std::vector<PatchLattice> PlaneWithHole() {
+  const Keep outside = [](double x, double y) { return std::hypot(x, y) > 0.15; };
+  std::vector<PatchLattice> surfaces;
+  for (const Eigen::Vector3d& center : {Eigen::Vector3d(0, 0, 1), {0.3, 0.1, 1}, {-0.2, 0.2, 1}}) {
+    surfaces.push_back(PlaneSeenBy(static_cast<CameraIndex>(surfaces.size()), LookAt(center, {0, 0, 0}, 0), outside));
+  }
+  return surfaces;
+}
+
+TEST_F(JoinedMeshTest, GapIsClosedWhereNoCameraLooksThrough) {
+  const JoinOptions options = {.max_hole_steps = 0};
+  const TriangleMesh closed = Join(PlaneWithHole(), options);
+  EXPECT_GT(counts_.closing_faces, 10);
+  EXPECT_EQ(CountLoops(BorderOf(closed)), 1);
+  for (double x = -0.2; x < 0.2; x += 0.0171) EXPECT_EQ(LayersAt(closed, x, 0.013), 1) << x;
+
+  const std::string bytes = *ReadFile(Path());
+  Join(PlaneWithHole(), options, 3);
+  EXPECT_TRUE(*ReadFile(Path()) == bytes) << "it depends on the number of threads";
+
+  const TriangleMesh open = Join(PlaneWithHole(), {.max_hole_steps = 0, .close_reach = 0});
+  EXPECT_EQ(counts_.closing_faces, 0);
+  EXPECT_EQ(CountLoops(BorderOf(open)), 2);
+  Join(PlaneWithHole(), {.max_hole_steps = 0, .close_reach = 0.01});
+  EXPECT_EQ(counts_.closing_faces, 0) << "it is too large";
+}
+
+TEST_F(JoinedMeshTest, GapThatOneCameraAloneSeesStaysOpen) {
+  const TriangleMesh mesh = Join({PlaneWithHole().front()}, {.max_hole_steps = 0});
+  EXPECT_EQ(counts_.closing_faces, 0);
+  EXPECT_EQ(CountLoops(BorderOf(mesh)), 2);
+}
+
+TEST_F(JoinedMeshTest, WindowThroughWhichSurfaceIsSeenStaysOpen) {
+  std::vector<PatchLattice> surfaces = PlaneWithHole();
+  for (PatchLattice& surface : surfaces) {
+    const Eigen::Vector3d center = surface.camera.center_in_world();
+    // What lies at z = -0.4 behind the window.
+    for (int row = 0; row < surface.lattice.rows; ++row) {
+      for (int column = 0; column < surface.lattice.columns; ++column) {
+        const auto node = static_cast<size_t>(surface.lattice.Index(column, row));
+        if (surface.depth[node] > 0) continue;
+        const Eigen::Vector2d pixel = surface.lattice.Pixel(column, row);
+        const Eigen::Vector3d ray =
+            surface.camera.cam_from_world.rotation.transpose() * surface.camera.RayInCam(pixel.x(), pixel.y());
+        surface.depth[node] = static_cast<float>((-0.4 - center.z()) / ray.z());
+        surface.normal_in_world[node] = Eigen::Vector3f(0, 0, 1);
+        surface.quality[node] = 0.9F;
+      }
+    }
+  }
+  const TriangleMesh mesh = Join(surfaces, {.min_component_faces = 0, .max_hole_steps = 0});
+  for (const auto& face : mesh.faces) {
+    Eigen::Vector3f middle = Eigen::Vector3f::Zero();
+    for (const uint32_t v : face) middle += mesh.positions[v] / 3;
+    EXPECT_FALSE(middle.head<2>().norm() < 0.1F && middle.z() > -0.2F) << "a triangle lies in the window";
+  }
+}
+
+TEST_F(JoinedMeshTest, PiecesThatMeetInAPointAloneAreTwo) {
+  // A crumb whose corner comes within a step of a plane's: a triangle to it would have its point alone.
+  const Camera camera = LookAt({0, 0, 1}, {0, 0, 0}, 0);
+  const Keep with_crumbs = [](double x, double y) {
+    return x + y < 0 || std::hypot(x - 0.12, y - 0.12) < 0.09 || std::hypot(x - 0.2, y + 0.1) < 0.06;
+  };
+  const TriangleMesh mesh = Join({PlaneSeenBy(0, camera, with_crumbs)}, {.min_component_faces = 60});
+  std::map<std::pair<uint32_t, uint32_t>, std::vector<int32_t>> at_edge;
+  DisjointSets sets(mesh.faces.size());
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    for (size_t k = 0; k < 3; ++k) {
+      auto& around = at_edge[std::minmax(mesh.faces[f][k], mesh.faces[f][(k + 1) % 3])];
+      for (const int32_t other : around) sets.Join(other, static_cast<int32_t>(f));
+      around.push_back(static_cast<int32_t>(f));
+    }
+  }
+  std::map<int32_t, int> faces_of_piece;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) ++faces_of_piece[sets.Root(static_cast<int32_t>(f))];
+  for (const auto& [root, faces] : faces_of_piece) EXPECT_GE(faces, 60);
+}
+
 TEST_F(JoinedMeshTest, IslandInAHoleBecomesPartOfTheFilling) {
   const Camera camera = LookAt({0, 0, 1}, {0, 0, 0}, 0);
   const TriangleMesh mesh = Join({PlaneSeenBy(0, camera,
@@ -436,6 +518,7 @@ TEST_F(JoinedMeshTest, SurfaceThatCannotBeLoadedLeavesNoFile) {
 
 TEST(JoinOptionsTest, RefusesValuesOutOfRange) {
   EXPECT_THAT(JoinOptions{.min_component_faces = -1}.Validate().ToString(), testing::HasSubstr("min_component_faces"));
+  EXPECT_THAT(JoinOptions{.close_reach = 1.5}.Validate().ToString(), testing::HasSubstr("close_reach"));
   EXPECT_THAT(JoinOptions{.max_hole_steps = NAN}.Validate().ToString(), testing::HasSubstr("max_hole_steps"));
   EXPECT_THAT(JoinOptions{.blend_steps = -1}.Validate().ToString(), testing::HasSubstr("blend_steps"));
   for (const double g : {-0.1, 100.1, static_cast<double>(NAN)}) {

@@ -16,6 +16,8 @@ namespace {
 constexpr double kOverlapSteps = 3;  // the radius of support in section 3.7
 // Steep patches lie further apart than d_r, but not more than this many times.
 constexpr float kMostSpacing = 4;
+// One sample for so many lattice steps in x and y.
+constexpr int kSampleSteps = 8;
 // Patches of parts worked on at the same time, some 150 bytes each.
 constexpr int64_t kMostPatchesAtOnce = 1'000'000;
 
@@ -27,9 +29,10 @@ struct Sketch {
 
 // One part as if it were the first.
 struct OnePart {
-  std::vector<bool> trimmed;
+  PartBorders::Part part;
   std::vector<BorderVertex> vertices;
   std::vector<BorderOrigin> origins;
+  std::vector<InnerSample> inner;
   std::vector<std::pair<int32_t, int32_t>> inner_edges;
   std::vector<int64_t> faces_of_component;
 };
@@ -74,6 +77,26 @@ void FindBorder(const SparseSurface& surface, const PartMesh& mesh, OnePart& par
   part.faces_of_component = mesh.faces_of_component;
 }
 
+// The first vertex of each tile of the lattice that is not on the border.
+std::vector<InnerSample> SampleInside(const SparseSurface& surface, const PartMesh& mesh) {
+  const int columns = surface.lattice.columns / kSampleSteps + 1;
+  std::vector<bool> is_taken(static_cast<size_t>(columns) *
+                             static_cast<size_t>(surface.lattice.rows / kSampleSteps + 1));
+  std::vector<InnerSample> samples;
+  for (size_t v = 0; v < mesh.patch_of_vertex.size(); ++v) {
+    if (mesh.next_on_border[v] != PartMesh::kInterior) continue;
+    const auto patch = static_cast<size_t>(mesh.patch_of_vertex[v]);
+    const int tile = surface.Row(patch) / kSampleSteps * columns + surface.Column(patch) / kSampleSteps;
+    if (is_taken[static_cast<size_t>(tile)]) continue;
+    is_taken[static_cast<size_t>(tile)] = true;
+    samples.push_back(
+        {.position = surface.Point(patch).cast<float>(),
+         .spacing = static_cast<float>(LevelOfDetail(surface.camera, surface.depth[patch], surface.lattice.step)),
+         .component = mesh.component_of_vertex[v]});
+  }
+  return samples;
+}
+
 absl::StatusOr<OnePart> LookAtPart(int64_t index, const LoadSurface& load,
                                    const std::vector<std::optional<Sketch>>& sketches, ThreadPool& pool) {
   MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load(index));
@@ -86,8 +109,17 @@ absl::StatusOr<OnePart> LookAtPart(int64_t index, const LoadSurface& load,
     MarkCovered(*surface, *cover, sketch.in_triangle, kOverlapSteps, pool, removed);
   }
   OnePart part;
-  part.trimmed.assign(removed.begin(), removed.end());
-  FindBorder(*surface, BuildPartMesh(*surface, removed), part);
+  part.part.trimmed.assign(removed.begin(), removed.end());
+  part.part.camera_index = surface->camera_index;
+  part.part.camera = surface->camera;
+  if (!surface->depth.empty()) {
+    const auto [nearest, farthest] = std::ranges::minmax_element(surface->depth);
+    part.part.nearest = *nearest;
+    part.part.farthest = *farthest;
+  }
+  const PartMesh mesh = BuildPartMesh(*surface, removed);
+  FindBorder(*surface, mesh, part);
+  part.inner = SampleInside(*surface, mesh);
   return part;
 }
 
@@ -95,8 +127,10 @@ absl::StatusOr<OnePart> LookAtPart(int64_t index, const LoadSurface& load,
 void Append(OnePart part, PartBorders& borders) {
   const auto first_border = static_cast<int32_t>(borders.vertices.size());
   const auto first_component = static_cast<int32_t>(borders.faces_of_component.size());
-  borders.parts.push_back(
-      {.trimmed = std::move(part.trimmed), .first_border = first_border, .first_component = first_component});
+  part.part.first_border = first_border;
+  part.part.first_inner = static_cast<int32_t>(borders.inner.size());
+  part.part.first_component = first_component;
+  borders.parts.push_back(std::move(part.part));
   for (BorderVertex& vertex : part.vertices) {
     vertex.next += first_border;
     borders.vertices.push_back(vertex);
@@ -104,6 +138,10 @@ void Append(OnePart part, PartBorders& borders) {
   for (BorderOrigin& origin : part.origins) {
     origin.component += first_component;
     borders.origins.push_back(origin);
+  }
+  for (InnerSample& sample : part.inner) {
+    sample.component += first_component;
+    borders.inner.push_back(sample);
   }
   for (const auto& [v, w] : part.inner_edges) borders.inner_edges.emplace_back(first_border + v, first_border + w);
   borders.faces_of_component.insert(borders.faces_of_component.end(), part.faces_of_component.begin(),
@@ -158,6 +196,7 @@ absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& lo
     for (OnePart& part : parts) Append(std::move(part), borders);
   }
   borders.parts.push_back({.first_border = static_cast<int32_t>(borders.vertices.size()),
+                           .first_inner = static_cast<int32_t>(borders.inner.size()),
                            .first_component = static_cast<int32_t>(borders.faces_of_component.size())});
   return borders;
 }

@@ -10,7 +10,9 @@
 
 #include <absl/status/statusor.h>
 
+#include "common/base/ids.h"
 #include "common/base/thread_pool.h"
+#include "common/geometry/camera.h"
 #include "common/mesh/border_stitching.h"
 #include "common/mesh/join_progress.h"
 #include "common/surface/sparse_surface.h"
@@ -28,16 +30,29 @@ struct BorderOrigin {
   std::array<uint8_t, 3> color = {};
 };
 
-// What is kept of every part while all are joined: where it is trimmed, and its border.
+// A vertex inside a part, one for some 8 x 8 steps of its lattice.
+struct InnerSample {
+  Eigen::Vector3f position;  // scene units, world frame
+  float spacing = 0;         // as of border vertices
+  int32_t component = 0;     // of all parts
+};
+
+// What is kept of every part while all are joined: where it is trimmed, its border, and what lies inside in outline.
 struct PartBorders {
   struct Part {
     std::vector<bool> trimmed;    // per patch
     int32_t first_border = 0;     // of its vertices below
+    int32_t first_inner = 0;      // of its samples
     int32_t first_component = 0;  // of its components
+    CameraIndex camera_index = 0;
+    Camera camera;
+    float nearest = 0;   // depth of its patches; 0 in both: it has none
+    float farthest = 0;
   };
   std::vector<Part> parts;  // and one more, which holds the ends
   std::vector<BorderVertex> vertices;
   std::vector<BorderOrigin> origins;
+  std::vector<InnerSample> inner;
   std::vector<std::pair<int32_t, int32_t>> inner_edges;
   std::vector<int64_t> faces_of_component;
 };

@@ -365,6 +365,7 @@ class LocalReconstruction {
                       {"stitch_faces", counts.stitch_faces},
                       {"holes_filled", counts.holes_filled},
                       {"hole_faces", counts.hole_faces},
+                      {"closing_faces", counts.closing_faces},
                       {"components_removed", counts.components_removed},
                       {"faces_simplified", counts.faces_simplified},
                       {"area", counts.area}};

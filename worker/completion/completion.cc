@@ -12,30 +12,14 @@
 
 #include "common/base/check.h"
 #include "common/base/out_of_range.h"
+#include "common/surface/lattice_sight.h"
 
 namespace meshwright {
 namespace {
 
 constexpr int kRowsPerPiece = 4;
 
-// Steps on the lattice, by angle.
-constexpr int kDirections = 16;
-constexpr std::array<std::array<int, 2>, kDirections> kStep = {{{1, 0},
-                                                                {2, 1},
-                                                                {1, 1},
-                                                                {1, 2},
-                                                                {0, 1},
-                                                                {-1, 2},
-                                                                {-1, 1},
-                                                                {-2, 1},
-                                                                {-1, 0},
-                                                                {-2, -1},
-                                                                {-1, -1},
-                                                                {-1, -2},
-                                                                {0, -1},
-                                                                {1, -2},
-                                                                {1, -1},
-                                                                {2, -1}}};
+constexpr int kDirections = LatticeSight::kDirections;
 // So many of them must meet the plane.
 constexpr int kMinOnPlane = 10;
 // Three directions that are at least so many apart span a plane well.
@@ -50,12 +34,6 @@ constexpr int kBehindRim = 4;
 // A window with more contrast, grey levels, was not blind: what it was compared with did not agree.
 constexpr float kMaxTexture = 2;
 
-// What there is around holes, per node.
-struct Surroundings {
-  std::vector<float> w;            // inverse depth, 0 where there is nothing to build on
-  std::vector<uint16_t> distance;  // to the nearest node that has some, lattice steps in the maximum norm
-};
-
 class Completer {
  public:
   Completer(const PatchScorer& scorer, const AcceptedDepth& accepted, const CompletionOptions& options,
@@ -65,7 +43,6 @@ class Completer {
         reach_(static_cast<int>(options.max_reach * std::max(lattice_.columns, lattice_.rows))),
         footprint_(static_cast<float>(lattice_.step) / static_cast<float>(scorer.reference().focal())) {
     FindSurroundings(surface, accepted);
-    MeasureDistances();
     for (int a = 0; a < kDirections; ++a) {
       for (int b = a + kMinApart; b < kDirections; ++b) {
         for (int c = b + kMinApart; c < kDirections && c - a <= kDirections - kMinApart; ++c) {
@@ -118,7 +95,8 @@ class Completer {
         all[i] = 1.0F / accepted.depth[i];
       }
     }
-    around_.w.assign(nodes, 0.0F);
+    around_w_.assign(nodes, 0.0F);
+    std::vector<uint8_t> has_surface(nodes, 0);
     for (int row = 0; row < lattice_.rows; ++row) {
       for (int column = 0; column < lattice_.columns; ++column) {
         const auto i = static_cast<size_t>(lattice_.Index(column, row));
@@ -131,49 +109,21 @@ class Completer {
             if (w > 0 && std::fabs(w - all[i]) <= kContinuedWithin * footprint_ * all[i]) ++continued;
           }
         }
-        if (continued >= kMinContinued) around_.w[i] = all[i];
+        if (continued < kMinContinued) continue;
+        around_w_[i] = all[i];
+        has_surface[i] = 1;
       }
     }
+    sight_.emplace(lattice_, has_surface);
   }
 
-  void MeasureDistances() {
-    constexpr int kFar = 0xFFFF;
-    around_.distance.assign(around_.w.size(), kFar);
-    const auto sweep = [&](int column, int row, int direction) {
-      const auto i = static_cast<size_t>(lattice_.Index(column, row));
-      int distance = around_.w[i] > 0 ? 0 : around_.distance[i];
-      const std::array<std::array<int, 2>, 4> before = {{{-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
-      for (const auto& [dx, dy] : before) {
-        if (!lattice_.Contains(column + direction * dx, row + direction * dy)) continue;
-        const auto k = static_cast<size_t>(lattice_.Index(column + direction * dx, row + direction * dy));
-        distance = std::min(distance, around_.distance[k] + 1);
-      }
-      around_.distance[i] = static_cast<uint16_t>(std::min(distance, kFar));
-    };
-    for (int row = 0; row < lattice_.rows; ++row) {
-      for (int column = 0; column < lattice_.columns; ++column) sweep(column, row, 1);
-    }
-    for (int row = lattice_.rows - 1; row >= 0; --row) {
-      for (int column = lattice_.columns - 1; column >= 0; --column) sweep(column, row, -1);
-    }
-  }
-
-  // The nearest surface in one direction. Whatever is nearer than the nearest of all is stepped over.
+  // The nearest surface in one direction.
   Hit Look(int column, int row, int direction) const {
-    const auto& [dx, dy] = kStep[static_cast<size_t>(direction)];
-    const int norm = std::max(std::abs(dx), std::abs(dy));
-    for (int steps = 1; steps * norm <= reach_;) {
-      const int c = column + steps * dx;
-      const int r = row + steps * dy;
-      if (!lattice_.Contains(c, r)) break;
-      const auto i = static_cast<size_t>(lattice_.Index(c, r));
-      if (around_.distance[i] == 0) {
-        return {steps, static_cast<float>(steps * dx * lattice_.step), static_cast<float>(steps * dy * lattice_.step),
-                around_.w[i]};
-      }
-      steps += std::max(1, around_.distance[i] / norm);
-    }
-    return {};
+    const int steps = sight_->StepsTo(column, row, direction, reach_);
+    if (steps == 0) return {};
+    const auto& [dx, dy] = LatticeSight::kStep[static_cast<size_t>(direction)];
+    return {steps, static_cast<float>(steps * dx * lattice_.step), static_cast<float>(steps * dy * lattice_.step),
+            around_w_[static_cast<size_t>(lattice_.Index(column + steps * dx, row + steps * dy))]};
   }
 
   // The plane through three of the hits that most of them lie on; of equals the one they are closest to.
@@ -220,10 +170,10 @@ class Completer {
       if (!(hit.w > 0)) continue;
       const double weight = 1.0 / std::hypot(hit.dx, hit.dy);
       for (int k = 0; k <= kBehindRim; ++k) {
-        const int dx = (hit.steps + k) * kStep[static_cast<size_t>(direction)][0];
-        const int dy = (hit.steps + k) * kStep[static_cast<size_t>(direction)][1];
+        const int dx = (hit.steps + k) * LatticeSight::kStep[static_cast<size_t>(direction)][0];
+        const int dy = (hit.steps + k) * LatticeSight::kStep[static_cast<size_t>(direction)][1];
         if (!lattice_.Contains(column + dx, row + dy)) break;
-        const float w = around_.w[static_cast<size_t>(lattice_.Index(column + dx, row + dy))];
+        const float w = around_w_[static_cast<size_t>(lattice_.Index(column + dx, row + dy))];
         const auto dx_px = static_cast<float>(dx * lattice_.step);
         const auto dy_px = static_cast<float>(dy * lattice_.step);
         if (!(w > 0) || !IsOn(plane, dx_px, dy_px, w)) break;
@@ -243,7 +193,8 @@ class Completer {
   const Lattice& lattice_;
   const int reach_;        // lattice steps
   const float footprint_;  // d_r in inverse depth, per inverse depth
-  Surroundings around_;
+  std::vector<float> around_w_;  // per node: inverse depth, 0 where there is nothing to build on
+  std::optional<LatticeSight> sight_;
   std::vector<std::array<int, 3>> triples_;
 };
 
