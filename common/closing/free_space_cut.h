@@ -24,12 +24,12 @@ struct Sight {
 
 // Where empty space ends: triangles of points, counter-clockwise seen from the empty side.
 //
-// Space is cut into the Delaunay tetrahedra of points and camera centres, and each is called empty or solid by a minimum
-// cut (Labatut et al. 2007; Jancosek and Pajdla 2011 build on it): a triangle costs one for each sight that crosses it,
-// less close to the sight's point; the tetrahedron a little behind a point is solid unless that costs more; those around
-// cameras are empty; what lies outside the hull is solid; and triangles that lie badly in the spheres around their
-// tetrahedra cost up to one. Costs are integers, so that the cut does not depend on rounding. Its time grows little
-// faster than the number of points.
+// Space is cut into the Delaunay tetrahedra of points and camera centres, and each is called empty or solid by a
+// minimum cut (Labatut et al. 2007; Jancosek and Pajdla 2011 build on it): a triangle costs one for each sight that
+// crosses it, less close to the sight's point; the tetrahedron a little behind a point is solid unless that costs more;
+// those around cameras are empty; what lies outside the hull is solid; and triangles that lie badly in the spheres
+// around their tetrahedra cost up to one. Costs are integers, so that the cut does not depend on rounding. Its time
+// grows little faster than the number of points.
 std::vector<std::array<int32_t, 3>> CutFreeSpace(absl::Span<const MeasuredPoint> points,
                                                  absl::Span<const Eigen::Vector3d> camera_centers_in_world,
                                                  absl::Span<const Sight> sights);

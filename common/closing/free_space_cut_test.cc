@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kSpacing = 0.05;
 
-// A wall z = 0, x and y in -1 .. 1, with a hole of radius 0.4 in its middle and a little noise, seen by cameras at z > 0.
+// A wall z = 0, x and y in -1 .. 1, with a hole of radius 0.4 in its middle and a little noise, seen by cameras at z >
+// 0.
 struct Wall {
   std::vector<MeasuredPoint> points;
   std::vector<Eigen::Vector3d> centers = {{0, 0, 3}, {1, 0.5, 2.5}, {-1, -0.5, 2.5}};

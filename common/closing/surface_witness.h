@@ -11,7 +11,8 @@
 
 namespace meshwright {
 
-// What one camera, by the surface that it has measured, can say about points and about triangles that might close a gap.
+// What one camera, by the surface that it has measured, can say about points and about triangles that might close a
+// gap.
 class SurfaceWitness {
  public:
   // `reach`: how large a gap is looked at, as a share of the photograph's longer side. Keeps a reference to `surface`.
@@ -23,8 +24,8 @@ class SurfaceWitness {
 
   struct Testimony {
     // The camera looks at the triangle's front, at an angle that shows something, with no surface before it; the
-    // triangle is not too large; and in nearly all directions around it the camera sees surface, so that it lies in a gap
-    // and not beyond a rim.
+    // triangle is not too large; and in nearly all directions around it the camera sees surface, so that it lies in a
+    // gap and not beyond a rim.
     bool vouches = false;
     // Rays that pass the triangle and end at surface, measured or inferred, well behind it.
     int64_t looks_through = 0;

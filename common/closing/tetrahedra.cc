@@ -129,8 +129,8 @@ Eigen::Vector3d Tetrahedra::Circumcenter(int32_t tetrahedron) const {
   const Eigen::Vector3d d = At(corner[3]) - a;
   const double volume = b.dot(c.cross(d));
   if (!(volume > std::numeric_limits<double>::min())) return a;
-  return a + (d.squaredNorm() * b.cross(c) + c.squaredNorm() * d.cross(b) + b.squaredNorm() * c.cross(d)) /
-                 (2 * volume);
+  return a +
+         (d.squaredNorm() * b.cross(c) + c.squaredNorm() * d.cross(b) + b.squaredNorm() * c.cross(d)) / (2 * volume);
 }
 
 Eigen::Vector3d Tetrahedra::InwardNormal(int32_t tetrahedron, int face) const {
@@ -167,8 +167,8 @@ int32_t Tetrahedra::Walk(int32_t point, const Eigen::Vector3d& direction,
     Crossing crossing = {.from = at, .face = -1, .distance = std::numeric_limits<double>::infinity()};
     for (int face = 0; face < 4; ++face) {
       // In the first one only the face opposite to the point can be met.
-      const bool may_be = entry < 0 ? tetrahedra_[static_cast<size_t>(at)].corner[static_cast<size_t>(face)] == point
-                                    : face != entry;
+      const bool may_be =
+          entry < 0 ? tetrahedra_[static_cast<size_t>(at)].corner[static_cast<size_t>(face)] == point : face != entry;
       if (!may_be) continue;
       const Eigen::Vector3d normal = InwardNormal(at, face);
       const double slope = normal.dot(direction);

@@ -27,8 +27,8 @@ class Tetrahedra {
     double distance = 0;  // from where the walk began, scene units
   };
 
-  // Fewer than five points, or points in one plane, have no tetrahedra. Points move by a joggle of rounding's size while
-  // they are triangulated, which depends on them alone; so four in a circle do no harm.
+  // Fewer than five points, or points in one plane, have no tetrahedra. Points move by a joggle of rounding's size
+  // while they are triangulated, which depends on them alone; so four in a circle do no harm.
   explicit Tetrahedra(std::vector<Eigen::Vector3d> points);
 
   const std::vector<Eigen::Vector3d>& points() const { return points_; }

@@ -67,7 +67,8 @@ TEST(Tetrahedra, WalkGoesStraightThroughNeighborsToTheHull) {
   const Tetrahedra tetrahedra(RandomPoints(500, 4));
   int walks = 0;
   for (int32_t point = 0; point < 100; ++point) {
-    const Eigen::Vector3d direction = Eigen::Vector3d(std::sin(point), std::cos(point), std::sin(3 * point)).normalized();
+    const Eigen::Vector3d direction =
+        Eigen::Vector3d(std::sin(point), std::cos(point), std::sin(3 * point)).normalized();
     const Eigen::Vector3d& x = tetrahedra.points()[static_cast<size_t>(point)];
     double before = 0;
     int32_t expected = -2;

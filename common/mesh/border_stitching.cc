@@ -602,8 +602,7 @@ int64_t BorderStitcher::SewOn(absl::Span<const Face> triangles) {
   for (size_t i = 0; i < triangles.size(); ++i) {
     double longest = 0;
     for (size_t k = 0; k < 3; ++k) {
-      longest =
-          std::max(longest, (Position(triangles[i][k]) - Position(triangles[i][(k + 1) % 3])).squaredNorm());
+      longest = std::max(longest, (Position(triangles[i][k]) - Position(triangles[i][(k + 1) % 3])).squaredNorm());
     }
     by_size.emplace_back(longest, i);
   }

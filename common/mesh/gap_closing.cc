@@ -144,8 +144,8 @@ class BlockCloser {
     MW_ASSIGN_OR_RETURN(const Triangles cut, Cut(around, seen_by));
     std::vector<Candidate> candidates;
     for (const auto& [a, b, c] : cut) {
-      const Candidate candidate{{around[static_cast<size_t>(a)], around[static_cast<size_t>(b)],
-                                 around[static_cast<size_t>(c)]}};
+      const Candidate candidate{
+          {around[static_cast<size_t>(a)], around[static_cast<size_t>(b)], around[static_cast<size_t>(c)]}};
       const bool may_be = std::ranges::all_of(candidate.points, [&](int32_t i) { return At(i).vertex >= 0; });
       if (may_be && block.Contains(MiddleOf(candidate))) candidates.push_back(candidate);
     }
@@ -191,8 +191,7 @@ class BlockCloser {
   }
 
   // Of indices into `around`.
-  absl::StatusOr<Triangles> Cut(const std::vector<int32_t>& around,
-                                                          const std::vector<int64_t>& seen_by) const {
+  absl::StatusOr<Triangles> Cut(const std::vector<int32_t>& around, const std::vector<int64_t>& seen_by) const {
     // A camera once, whatever parts of it there are.
     std::vector<Eigen::Vector3d> centers;
     absl::flat_hash_map<CameraIndex, int32_t> number;
@@ -259,9 +258,9 @@ class BlockCloser {
 absl::StatusOr<std::vector<BorderStitcher::Face>> FindGapTriangles(const PartBorders& borders,
                                                                    const std::vector<BorderVertex>& vertices,
                                                                    const std::function<bool(int32_t)>& is_open,
-                                                                   const std::vector<uint8_t>& is_small,
-                                                                   double reach, const LoadSurface& load,
-                                                                   ThreadPool& pool, JoinProgress& progress) {
+                                                                   const std::vector<uint8_t>& is_small, double reach,
+                                                                   const LoadSurface& load, ThreadPool& pool,
+                                                                   JoinProgress& progress) {
   const std::vector<ClosingPoint> points = CollectPoints(borders, vertices, is_open, is_small);
   std::vector<Block> blocks;
   Block all;

@@ -206,13 +206,14 @@ std::vector<std::pair<int32_t, int32_t>> SortedEdges(const std::vector<BorderSti
   return edges;
 }
 
-// Stitches all but the components that are small, and finds which are. Triangles to crumbs keep others from meeting, so
-// what is left is stitched anew without them, until all that is left is large.
+// Stitches all but the components that are small, and finds which are. Triangles to crumbs keep others from meeting:
+// these are taken away with them, and what they leave open is stitched again, until all that is left is large.
 BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, ThreadPool& pool,
                         JoinProgress& progress, std::vector<uint8_t>& small, JoinedMeshCounts& counts) {
   small.assign(borders.faces_of_component.size(), 0);
   const std::vector<uint8_t> lone = LoneTriangles(borders);
   std::function<void()> step = [&] { progress.Step(JoinStage::kStitching, BorderStitcher::kSteps); };
+  std::vector<BorderStitcher::Face> stays;
   while (true) {
     BorderStitcher stitcher(borders.vertices, borders.inner_edges);
     std::vector<uint8_t> drop = lone;
@@ -220,16 +221,21 @@ BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, 
       if (small[static_cast<size_t>(borders.origins[v].component)] != 0) drop[v] = 1;
     }
     stitcher.Drop(drop);
+    stitcher.SewOn(stays);
     stitcher.StitchNearby(kStitchReach, pool, step);
     step = [] {};
     int64_t removed = 0;
-    std::vector<uint8_t> now_small =
-        SmallComponents(borders, stitcher.faces(), options.min_component_faces, removed);
+    std::vector<uint8_t> now_small = SmallComponents(borders, stitcher.faces(), options.min_component_faces, removed);
     if (now_small == small) {
       counts.components_removed = removed;
       return stitcher;
     }
     small = std::move(now_small);
+    const auto is_small = [&](int32_t v) {
+      return small[static_cast<size_t>(borders.origins[static_cast<size_t>(v)].component)] != 0;
+    };
+    stays = stitcher.faces();
+    std::erase_if(stays, [&](const BorderStitcher::Face& face) { return std::ranges::any_of(face, is_small); });
   }
 }
 
@@ -242,8 +248,9 @@ absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions&
   counts.holes_filled = stitcher.FillHoles(options.max_hole_steps, step);
   if (options.close_reach > 0) {
     MW_ASSIGN_OR_RETURN(const std::vector<BorderStitcher::Face> triangles,
-                        FindGapTriangles(borders, stitcher.vertices(), [&](int32_t v) { return stitcher.IsOpen(v); },
-                                         joins.small, options.close_reach, load, pool, progress));
+                        FindGapTriangles(
+                            borders, stitcher.vertices(), [&](int32_t v) { return stitcher.IsOpen(v); }, joins.small,
+                            options.close_reach, load, pool, progress));
     counts.closing_faces = stitcher.SewOn(triangles);
     // What it has left open is small now.
     counts.holes_filled += stitcher.FillHoles(options.max_hole_steps, [] {});

@@ -48,10 +48,10 @@ struct JoinedMeshCounts {
 
 // Joins the accepted surfaces 0 .. count - 1 (M_r of section 3.7, Jancosek et al. 2009, which leaves them side by side)
 // into one mesh and writes it as PLY, with `offset` added (Scene::offset). Where surfaces overlap, the earlier one
-// stays. Borders that come close are stitched, holes filled, gaps closed, small pieces left out, colours run into each other at the
-// seams; positions stay. Parts are simplified one by one if wanted, all but their borders. Every edge has one or two
-// triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their order alone, not
-// on the threads.
+// stays. Borders that come close are stitched, holes filled, gaps closed, small pieces left out, colours run into each
+// other at the seams; positions stay. Parts are simplified one by one if wanted, all but their borders. Every edge has
+// one or two triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their order
+// alone, not on the threads.
 //
 // Loads each surface a few times, a few of them at a time, and keeps the vertices on borders of all of them (some 300
 // bytes each, and 1/4 byte for each patch). Errors: those of `load` or of PlyStreamWriter, InvalidArgument for options;

@@ -46,7 +46,7 @@ struct PartBorders {
     int32_t first_component = 0;  // of its components
     CameraIndex camera_index = 0;
     Camera camera;
-    float nearest = 0;   // depth of its patches; 0 in both: it has none
+    float nearest = 0;  // depth of its patches; 0 in both: it has none
     float farthest = 0;
   };
   std::vector<Part> parts;  // and one more, which holds the ends

@@ -34,8 +34,8 @@ class LatticeSight {
   // `is_marked`, per node, not 0 for those that are looked for.
   LatticeSight(const Lattice& lattice, const std::vector<uint8_t>& is_marked);
 
-  // After how many of kStep[direction] from the node, at least one, there is a marked one no further than `reach` in the
-  // maximum norm; 0: nowhere. What no step can be nearer to than the nearest node of all is stepped over.
+  // After how many of kStep[direction] from the node, at least one, there is a marked one no further than `reach` in
+  // the maximum norm; 0: nowhere. What no step can be nearer to than the nearest node of all is stepped over.
   int StepsTo(int column, int row, int direction, int reach) const;
 
  private:

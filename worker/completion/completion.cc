@@ -191,8 +191,8 @@ class Completer {
 
   const PatchScorer& scorer_;
   const Lattice& lattice_;
-  const int reach_;        // lattice steps
-  const float footprint_;  // d_r in inverse depth, per inverse depth
+  const int reach_;              // lattice steps
+  const float footprint_;        // d_r in inverse depth, per inverse depth
   std::vector<float> around_w_;  // per node: inverse depth, 0 where there is nothing to build on
   std::optional<LatticeSight> sight_;
   std::vector<std::array<int, 3>> triples_;
