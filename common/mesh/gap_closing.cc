@@ -24,7 +24,7 @@ namespace {
 // Points of a block, less those around it that are looked at with it.
 constexpr size_t kPointsOfBlock = 10'000;
 // How far around a block, as a share of its longest side.
-constexpr double kMargin = 0.25;
+constexpr double kMargin = 0.1;
 // A camera has measured a point when its surface passes within so many spacings.
 constexpr double kMeasuredSpacings = 3;
 // So many cameras have to vouch for a triangle.
