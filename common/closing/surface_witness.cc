@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -25,13 +26,23 @@ std::vector<uint8_t> HasPatch(const SparseSurface& surface) {
   return has_patch;
 }
 
+// Nothing when a corner does not lie before the camera.
+std::optional<std::array<Eigen::Vector3d, 3>> InCam(const Camera& camera,
+                                                    const std::array<Eigen::Vector3d, 3>& triangle_in_world) {
+  std::array<Eigen::Vector3d, 3> in_cam;
+  for (size_t k = 0; k < 3; ++k) {
+    in_cam[k] = camera.CamFromWorld(triangle_in_world[k]);
+    if (!(in_cam[k].z() > 0)) return std::nullopt;
+  }
+  return in_cam;
+}
+
 }  // namespace
 
-SurfaceWitness::SurfaceWitness(const SparseSurface& surface, double reach)
-    : surface_(surface),
-      finder_(surface),
-      sight_(surface.lattice, HasPatch(surface)),
-      longest_px_(reach * std::max(surface.camera.width, surface.camera.height)) {}
+GapWitness::GapWitness(const SurfaceWitness& witness, double reach)
+    : witness_(witness),
+      sight_(witness.surface().lattice, HasPatch(witness.surface())),
+      longest_px_(reach * std::max(witness.surface().camera.width, witness.surface().camera.height)) {}
 
 double SurfaceWitness::DepthAt(int column, int row) const {
   const int32_t patch = finder_.At(surface_.lattice.Index(column, row));
@@ -54,20 +65,23 @@ bool SurfaceWitness::Measured(const Eigen::Vector3d& x_in_world, double radius) 
   return false;
 }
 
-bool SurfaceWitness::Vouches(const std::array<Eigen::Vector3d, 3>& triangle_in_cam) const {
-  const auto& [a, b, c] = triangle_in_cam;
+bool GapWitness::Vouches(const std::array<Eigen::Vector3d, 3>& triangle_in_world) const {
+  const Camera& camera = witness_.surface().camera;
+  const auto triangle_in_cam = InCam(camera, triangle_in_world);
+  if (!triangle_in_cam.has_value()) return false;
+  const auto& [a, b, c] = *triangle_in_cam;
   const Eigen::Vector3d middle = (a + b + c) / 3;
   const Eigen::Vector3d normal = (b - a).cross(c - a).normalized();
   if (normal.dot(-middle.normalized()) < kMinCosine) return false;
   const double longest = std::sqrt(std::max({(a - b).squaredNorm(), (b - c).squaredNorm(), (c - a).squaredNorm()}));
-  if (longest * surface_.camera.focal() > longest_px_ * middle.z()) return false;
-  const Lattice& lattice = surface_.lattice;
-  const Eigen::Vector2d at = lattice.FromPixel(surface_.camera.ProjectFromCam(middle));
+  if (longest * camera.focal() > longest_px_ * middle.z()) return false;
+  const Lattice& lattice = witness_.surface().lattice;
+  const Eigen::Vector2d at = lattice.FromPixel(camera.ProjectFromCam(middle));
   const auto column = static_cast<int>(std::lround(at.x()));
   const auto row = static_cast<int>(std::lround(at.y()));
   if (!lattice.Contains(column, row)) return false;
-  const double depth = DepthAt(column, row);
-  if (depth > 0 && depth < middle.z() - kClearance * LevelOfDetail(surface_.camera, depth, lattice.step)) return false;
+  const double depth = witness_.DepthAt(column, row);
+  if (depth > 0 && depth < middle.z() - kClearance * LevelOfDetail(camera, depth, lattice.step)) return false;
   const int reach = static_cast<int>(longest_px_ / lattice.step);
   int surrounded = 0;
   for (int direction = 0; direction < LatticeSight::kDirections; ++direction) {
@@ -76,7 +90,10 @@ bool SurfaceWitness::Vouches(const std::array<Eigen::Vector3d, 3>& triangle_in_c
   return surrounded >= kMinDirections;
 }
 
-int64_t SurfaceWitness::CountLooksThrough(const std::array<Eigen::Vector3d, 3>& triangle_in_cam) const {
+int64_t SurfaceWitness::CountLooksThrough(const std::array<Eigen::Vector3d, 3>& triangle_in_world) const {
+  const auto in_cam = InCam(surface_.camera, triangle_in_world);
+  if (!in_cam.has_value()) return 0;
+  const std::array<Eigen::Vector3d, 3>& triangle_in_cam = *in_cam;
   const Lattice& lattice = surface_.lattice;
   std::array<Eigen::Vector2d, 3> at;
   Eigen::Vector2d low(lattice.columns, lattice.rows);
@@ -111,15 +128,6 @@ int64_t SurfaceWitness::CountLooksThrough(const std::array<Eigen::Vector3d, 3>& 
     }
   }
   return count;
-}
-
-SurfaceWitness::Testimony SurfaceWitness::About(const std::array<Eigen::Vector3d, 3>& triangle_in_world) const {
-  std::array<Eigen::Vector3d, 3> in_cam;
-  for (size_t k = 0; k < 3; ++k) {
-    in_cam[k] = surface_.camera.CamFromWorld(triangle_in_world[k]);
-    if (!(in_cam[k].z() > 0)) return {};
-  }
-  return {.vouches = Vouches(in_cam), .looks_through = CountLooksThrough(in_cam)};
 }
 
 }  // namespace meshwright

@@ -35,7 +35,7 @@ std::array<Eigen::Vector3d, 3> Triangle(double z, double size) {
 
 TEST(SurfaceWitness, HasMeasuredWhatItsSurfacePasses) {
   const SparseSurface surface = SurfaceOf([](int column, int row) { return InHole(column, row) ? 0.0 : 2.0; });
-  const SurfaceWitness witness(surface, 0.33);
+  const SurfaceWitness witness(surface);
   const Eigen::Vector3d beside = Viewer().BackProject(40, 30, 2);
   EXPECT_TRUE(witness.Measured(beside, 0.1));
   EXPECT_TRUE(witness.Measured(beside * (2.05 / 2), 0.1));
@@ -45,49 +45,51 @@ TEST(SurfaceWitness, HasMeasuredWhatItsSurfacePasses) {
   EXPECT_FALSE(witness.Measured({9, 0, 2}, 0.1)) << "outside of the picture";
 }
 
-TEST(SurfaceWitness, VouchesForWhatClosesAGapInItsSurface) {
+TEST(GapWitness, VouchesForWhatClosesAGapInItsSurface) {
   const SparseSurface surface = SurfaceOf([](int column, int row) { return InHole(column, row) ? 0.0 : 2.0; });
-  const SurfaceWitness witness(surface, 0.33);
-  const auto testimony = witness.About(Triangle(2, 0.3));
-  EXPECT_TRUE(testimony.vouches);
-  EXPECT_EQ(testimony.looks_through, 0);
+  const SurfaceWitness witness(surface);
+  const GapWitness gap(witness, 0.33);
+  EXPECT_TRUE(gap.Vouches(Triangle(2, 0.3)));
+  EXPECT_EQ(witness.CountLooksThrough(Triangle(2, 0.3)), 0);
   const auto [a, b, c] = Triangle(2, 0.3);
-  EXPECT_FALSE(witness.About({a, c, b}).vouches) << "its back";
-  EXPECT_FALSE(SurfaceWitness(surface, 0.05).About(Triangle(2, 0.3)).vouches) << "too large";
+  EXPECT_FALSE(gap.Vouches({a, c, b})) << "its back";
+  EXPECT_FALSE(GapWitness(witness, 0.05).Vouches(Triangle(2, 0.3))) << "too large";
   const Eigen::Vector3d far_back = b + Eigen::Vector3d(0, 0, 3);
-  EXPECT_FALSE(witness.About({a, far_back, c}).vouches) << "too flat to show anything";
+  EXPECT_FALSE(gap.Vouches({a, far_back, c})) << "too flat to show anything";
 }
 
-TEST(SurfaceWitness, DoesNotVouchBeyondARim) {
+TEST(GapWitness, DoesNotVouchBeyondARim) {
   // Surface in the lower half alone.
   const SparseSurface surface = SurfaceOf([](int, int row) { return row > 32 ? 2.0 : 0.0; });
-  EXPECT_FALSE(SurfaceWitness(surface, 1).About(Triangle(2, 0.3)).vouches);
+  const SurfaceWitness witness(surface);
+  EXPECT_FALSE(GapWitness(witness, 1).Vouches(Triangle(2, 0.3)));
 }
 
-TEST(SurfaceWitness, DoesNotVouchForWhatIsHidden) {
+TEST(GapWitness, DoesNotVouchForWhatIsHidden) {
   const SparseSurface surface = SurfaceOf([](int, int) { return 2.0; });
-  const SurfaceWitness witness(surface, 0.33);
-  EXPECT_TRUE(witness.About(Triangle(2.1, 0.3)).vouches) << "on the surface, within three steps";
-  EXPECT_FALSE(witness.About(Triangle(3, 0.3)).vouches);
-  EXPECT_EQ(witness.About(Triangle(3, 0.3)).looks_through, 0);
+  const SurfaceWitness witness(surface);
+  const GapWitness gap(witness, 0.33);
+  EXPECT_TRUE(gap.Vouches(Triangle(2.1, 0.3))) << "on the surface, within three steps";
+  EXPECT_FALSE(gap.Vouches(Triangle(3, 0.3)));
+  EXPECT_EQ(witness.CountLooksThrough(Triangle(3, 0.3)), 0);
 }
 
 TEST(SurfaceWitness, CountsTheRaysThatPassThrough) {
   const SparseSurface surface = SurfaceOf([](int, int) { return 4.0; });
-  const SurfaceWitness witness(surface, 0.33);
+  const SurfaceWitness witness(surface);
   // At depth 2 a step is 1/25: a triangle of 0.5 * 0.4 * 0.36 is crossed by some 45 rays.
-  EXPECT_NEAR(static_cast<double>(witness.About(Triangle(2, 0.4)).looks_through), 0.072 * 625, 8);
-  EXPECT_EQ(witness.About(Triangle(3.9, 0.4)).looks_through, 0) << "its own surface";
-  EXPECT_EQ(witness.About(Triangle(-2, 0.4)).looks_through, 0) << "behind the camera";
+  EXPECT_NEAR(static_cast<double>(witness.CountLooksThrough(Triangle(2, 0.4))), 0.072 * 625, 8);
+  EXPECT_EQ(witness.CountLooksThrough(Triangle(3.9, 0.4)), 0) << "its own surface";
+  EXPECT_EQ(witness.CountLooksThrough(Triangle(-2, 0.4)), 0) << "behind the camera";
 }
 
 TEST(SurfaceWitness, HasNotMeasuredWhatItInferred) {
   PatchLattice lattice = SurfaceOf([](int, int) { return 4.0; }).ToLattice();
   for (float& quality : lattice.quality) quality = PatchLattice::kInferredQuality;
   const SparseSurface surface = SparseSurface::From(lattice);
-  const SurfaceWitness witness(surface, 0.33);
+  const SurfaceWitness witness(surface);
   EXPECT_FALSE(witness.Measured({0, 0, 4}, 0.1));
-  EXPECT_GT(witness.About(Triangle(2, 0.4)).looks_through, 20) << "but it is not to be hidden";
+  EXPECT_GT(witness.CountLooksThrough(Triangle(2, 0.4)), 20) << "but it is not to be hidden";
 }
 
 }  // namespace

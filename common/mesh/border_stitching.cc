@@ -203,6 +203,14 @@ bool BorderStitcher::InGap(int32_t corner, int32_t vertex, const Scope& scope) c
   return InSector(NormalFor(at.vertex, scope), Position(previous) - x, Position(vertex) - x, Position(next) - x);
 }
 
+bool BorderStitcher::MakesNewEdges(int32_t edge, int32_t corner) const {
+  const int32_t end = At(edge).next;
+  const int32_t c = VertexOf(corner);
+  const bool after = At(end).next == corner;
+  const bool before = At(edge).previous == corner;
+  return (after || !HasEdge(VertexOf(end), c)) && (before || !HasEdge(VertexOf(edge), c));
+}
+
 bool BorderStitcher::FitsGaps(int32_t edge, int32_t corner, const Scope& scope) const {
   const int32_t end = At(edge).next;
   const int32_t a = VertexOf(edge);
@@ -210,8 +218,7 @@ bool BorderStitcher::FitsGaps(int32_t edge, int32_t corner, const Scope& scope) 
   const int32_t c = VertexOf(corner);
   const bool after = At(end).next == corner;
   const bool before = At(edge).previous == corner;
-  if (!after && HasEdge(b, c)) return false;
-  if (!before && HasEdge(a, c)) return false;
+  if (!MakesNewEdges(edge, corner)) return false;
   if (!before && !InGap(edge, c, scope)) return false;
   if (!after && !InGap(end, c, scope)) return false;
   if (!before && !InGap(corner, a, scope)) return false;
@@ -586,7 +593,7 @@ std::pair<int32_t, int32_t> BorderStitcher::PlaceFor(const Face& triangle) const
         if (!At(corner).open) continue;
         const bool after = At(At(edge).next).next == corner;
         const bool before = At(edge).previous == corner;
-        if ((!after && HasEdge(b, c)) || (!before && HasEdge(a, c))) continue;
+        if (!MakesNewEdges(edge, corner)) continue;
         // Which of several gaps it lies in is to be seen; a vertex with one has no choice, however its rim is turned.
         const bool has_choice = open_at_vertex_[static_cast<size_t>(c)] > 1 && !after && !before;
         if (!has_choice || FitsGaps(edge, corner, {})) return {edge, corner};

@@ -115,7 +115,9 @@ class BorderStitcher {
   std::vector<Candidate> BestForEach(absl::Span<const int32_t> edges, const Scope& scope, ThreadPool& pool,
                                      const Progress& progress);
   bool Fits(const EdgeFrame& frame, int32_t edge, int32_t corner, const Scope& scope, const Scratch& scratch) const;
-  // Whether the triangle over `edge` to `corner` keeps to the gaps of its corners.
+  // Whether the triangle over `edge` to `corner` makes no edge that is there already.
+  bool MakesNewEdges(int32_t edge, int32_t corner) const;
+  // The same, and whether it keeps to the gaps of its corners.
   bool FitsGaps(int32_t edge, int32_t corner, const Scope& scope) const;
   // Where the triangle can be sewn on now: an open edge of it and the corner opposite; {-1, -1}: nowhere.
   std::pair<int32_t, int32_t> PlaceFor(const Face& triangle) const;

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -52,8 +53,7 @@ struct Block {
   }
 };
 
-std::vector<ClosingPoint> CollectPoints(const PartBorders& borders, const std::vector<BorderVertex>& vertices,
-                                        const std::function<bool(int32_t)>& is_open,
+std::vector<ClosingPoint> CollectPoints(const PartBorders& borders, const std::function<bool(int32_t)>& is_open,
                                         const std::vector<uint8_t>& is_small) {
   std::vector<ClosingPoint> points;
   for (size_t part = 0; part + 1 < borders.parts.size(); ++part) {
@@ -61,7 +61,7 @@ std::vector<ClosingPoint> CollectPoints(const PartBorders& borders, const std::v
     const PartBorders::Part& to = borders.parts[part + 1];
     for (int32_t v = from.first_border; v < to.first_border; ++v) {
       if (!is_open(v)) continue;
-      const BorderVertex& vertex = vertices[static_cast<size_t>(v)];
+      const BorderVertex& vertex = borders.vertices[static_cast<size_t>(v)];
       points.push_back({{vertex.position.cast<double>(), vertex.spacing}, v, static_cast<int32_t>(part)});
     }
     for (int32_t i = from.first_inner; i < to.first_inner; ++i) {
@@ -211,7 +211,7 @@ class BlockCloser {
     for (const int64_t part : seen_by) {
       if (!is_first_[static_cast<size_t>(part)]) continue;
       MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load_(part));
-      const SurfaceWitness witness(*surface, reach_);
+      const SurfaceWitness witness(*surface);
       const int32_t camera = number_of(borders_.parts[static_cast<size_t>(part)]);
       for (size_t i = 0; i < measured.size(); ++i) {
         if (owner[i] == camera) continue;
@@ -227,11 +227,13 @@ class BlockCloser {
     if (candidates.empty()) return absl::OkStatus();
     for (const int64_t part : seen_by) {
       MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load_(part));
-      const SurfaceWitness witness(*surface, reach_);
+      const SurfaceWitness witness(*surface);
+      std::optional<GapWitness> gap;
+      if (is_first_[static_cast<size_t>(part)]) gap.emplace(witness, reach_);
       for (Candidate& candidate : candidates) {
-        const SurfaceWitness::Testimony testimony = witness.About(CornersOf(candidate));
-        if (testimony.vouches && is_first_[static_cast<size_t>(part)]) ++candidate.vouchers;
-        candidate.looks_through += testimony.looks_through;
+        const std::array<Eigen::Vector3d, 3> corners = CornersOf(candidate);
+        if (gap.has_value() && gap->Vouches(corners)) ++candidate.vouchers;
+        candidate.looks_through += witness.CountLooksThrough(corners);
       }
     }
     return absl::OkStatus();
@@ -256,12 +258,11 @@ class BlockCloser {
 }  // namespace
 
 absl::StatusOr<std::vector<BorderStitcher::Face>> FindGapTriangles(const PartBorders& borders,
-                                                                   const std::vector<BorderVertex>& vertices,
                                                                    const std::function<bool(int32_t)>& is_open,
                                                                    const std::vector<uint8_t>& is_small, double reach,
                                                                    const LoadSurface& load, ThreadPool& pool,
                                                                    JoinProgress& progress) {
-  const std::vector<ClosingPoint> points = CollectPoints(borders, vertices, is_open, is_small);
+  const std::vector<ClosingPoint> points = CollectPoints(borders, is_open, is_small);
   std::vector<Block> blocks;
   Block all;
   all.points.resize(points.size());

@@ -16,14 +16,13 @@ namespace meshwright {
 
 // Triangles between border vertices, counter-clockwise seen from outside, that close gaps where no camera contradicts:
 // they lie where the space that cameras look through ends (CutFreeSpace), at least two cameras vouch for each of them,
-// and few rays pass through it (SurfaceWitness). `reach`: how large gaps may be, as a share of a photograph's longer
-// side.
+// and few rays pass through it (GapWitness, SurfaceWitness). `reach`: how large gaps may be, as a share of a
+// photograph's longer side.
 //
 // `is_open`, per border vertex: it may take triangles. `is_small`, per component: it has been left out. Works in blocks
 // of vertices, one a thread, with the surfaces that see a block loaded one after the other, so memory grows with
 // neither photographs nor mesh. Depends on the surfaces and their order alone. Errors: those of `load`.
 absl::StatusOr<std::vector<BorderStitcher::Face>> FindGapTriangles(const PartBorders& borders,
-                                                                   const std::vector<BorderVertex>& vertices,
                                                                    const std::function<bool(int32_t)>& is_open,
                                                                    const std::vector<uint8_t>& is_small, double reach,
                                                                    const LoadSurface& load, ThreadPool& pool,

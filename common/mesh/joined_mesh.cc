@@ -249,8 +249,8 @@ absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions&
   if (options.close_reach > 0) {
     MW_ASSIGN_OR_RETURN(const std::vector<BorderStitcher::Face> triangles,
                         FindGapTriangles(
-                            borders, stitcher.vertices(), [&](int32_t v) { return stitcher.IsOpen(v); }, joins.small,
-                            options.close_reach, load, pool, progress));
+                            borders, [&](int32_t v) { return stitcher.IsOpen(v); }, joins.small, options.close_reach,
+                            load, pool, progress));
     counts.closing_faces = stitcher.SewOn(triangles);
     // What it has left open is small now.
     counts.holes_filled += stitcher.FillHoles(options.max_hole_steps, [] {});
@@ -376,6 +376,7 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
     counts.patches_trimmed += std::ranges::count(trimmed, true);
   }
   MW_ASSIGN_OR_RETURN(const Joins joins, JoinBorders(borders, options, load, pool, progress, counts));
+  borders.vertices = {};
   borders.inner = {};
   borders.inner_edges = {};
 
