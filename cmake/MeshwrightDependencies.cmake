@@ -12,7 +12,7 @@ find_package(OpenSSL REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(PostgreSQL REQUIRED)
 find_package(CURL REQUIRED)
-find_package(Boost 1.81 REQUIRED)  # Asio and Beast: headers alone
+find_package(Boost 1.81 REQUIRED)  # Asio, Beast and Graph: headers alone
 find_package(meshoptimizer REQUIRED)
 find_package(Qhull REQUIRED)
 find_package(nlohmann_json REQUIRED)
