@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include <Eigen/Geometry>
+#include <absl/container/flat_hash_set.h>
 
 #include "common/base/check.h"
 #include "common/mesh/loop_triangulation.h"
@@ -34,12 +35,16 @@ constexpr double kMinSheetCosine = 0.5;
 
 double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
+// How far around a block, as a share of its longest side, vertices are sorted into grids; what edges further away need is
+// looked for one by one.
+constexpr double kMargin = 0.1;
 // Edges that one thread looks at before it takes the next ones, and triangles between two looks at how far it is.
 constexpr int64_t kEdgesAtOnce = 1024;
 constexpr size_t kPopsAStep = 4096;
+// Holes filled before memory is given back.
+constexpr size_t kHolesAtOnce = 16384;
 // Of BorderStitcher::kSteps, by the time that they take.
-constexpr int kStepsOfLooking = 25;
-constexpr int kStepsOfStitching = 25;
+constexpr int kStepsOfStitching = 50;
 
 // Calls `step` as often as a share of `total` asks for that is reached. Thread-safe.
 class Steps {
@@ -102,18 +107,37 @@ struct BorderStitcher::EdgeFrame {
   Eigen::Vector2d Project(const Eigen::Vector3d& x) const { return {(x - a).dot(x_axis), (x - a).dot(y_axis)}; }
 };
 
-BorderStitcher::BorderStitcher(std::vector<BorderVertex> vertices,
-                               absl::Span<const std::pair<int32_t, int32_t>> inner_edges)
-    : vertices_(std::move(vertices)), open_at_vertex_(vertices_.size(), 1) {
-  corners_.resize(vertices_.size());
+BorderStitcher::BorderStitcher(absl::Span<const BorderVertex> vertices,
+                               absl::Span<const std::pair<int32_t, int32_t>> inner_edges,
+                               const std::string& spool_beside)
+    : vertices_(vertices),
+      inner_edges_(inner_edges),
+      spool_beside_(spool_beside),
+      previous_in_part_(spool_beside),
+      first_inner_edge_(spool_beside),
+      corners_(spool_beside),
+      open_at_vertex_(spool_beside),
+      faces_(spool_beside),
+      last_at_vertex_(spool_beside),
+      one_before_(spool_beside) {
+  open_at_vertex_.assign(vertices_.size(), 1);
+  last_at_vertex_.assign(vertices_.size(), kEnd);
+  previous_in_part_.assign(vertices_.size(), kNone);
+  corners_.assign(vertices_.size(), {});
+  size_t edge = 0;
   for (size_t v = 0; v < vertices_.size(); ++v) {
     const int32_t next = vertices_[v].next;
     corners_[v].vertex = static_cast<int32_t>(v);
     corners_[v].next = next;
     At(next).previous = static_cast<int32_t>(v);
-    AddEdge(static_cast<int32_t>(v), next);
+    previous_in_part_[static_cast<size_t>(next)] = static_cast<int32_t>(v);
+    first_inner_edge_.push_back(static_cast<int32_t>(edge));
+    for (; edge < inner_edges.size() && inner_edges[edge].first == static_cast<int32_t>(v); ++edge) {
+      MW_CHECK(inner_edges[edge].second > static_cast<int32_t>(v));
+    }
   }
-  for (const auto& [v, w] : inner_edges) AddEdge(v, w);
+  MW_CHECK(edge == inner_edges.size());
+  first_inner_edge_.push_back(static_cast<int32_t>(edge));
 }
 
 bool BorderStitcher::IsBlocked(absl::Span<const Segment> blockers, const Segment& segment) {
@@ -124,8 +148,55 @@ bool BorderStitcher::IsBlocked(absl::Span<const Segment> blockers, const Segment
   });
 }
 
-bool BorderStitcher::HasEdge(int32_t v, int32_t w) const { return edges_.contains(std::minmax(v, w)); }
-void BorderStitcher::AddEdge(int32_t v, int32_t w) { edges_.insert(std::minmax(v, w)); }
+bool BorderStitcher::HasEdge(int32_t v, int32_t w) const {
+  if (Vertex(v).next == w || Vertex(w).next == v) return true;
+  const auto [low, high] = std::minmax(v, w);
+  const auto at = static_cast<size_t>(low);
+  for (int32_t edge = first_inner_edge_[at]; edge < first_inner_edge_[at + 1]; ++edge) {
+    if (inner_edges_[static_cast<size_t>(edge)].second == high) return true;
+  }
+  for (uint32_t entry = last_at_vertex_[at]; entry != kEnd; entry = one_before_[entry]) {
+    const Face& face = faces_[entry / 3];
+    if (std::ranges::find(face, high) != face.end()) return true;
+  }
+  return false;
+}
+
+void BorderStitcher::AddFace(const Face& face) {
+  for (size_t k = 0; k < 3; ++k) {
+    uint32_t& last = last_at_vertex_[static_cast<size_t>(face[k])];
+    one_before_.push_back(last);
+    last = static_cast<uint32_t>(3 * faces_.size() + k);
+  }
+  MW_CHECK(one_before_.size() < kEnd);
+  faces_.push_back(face);
+}
+
+int32_t BorderStitcher::FaceAlong(int32_t from, int32_t to) const {
+  for (uint32_t entry = last_at_vertex_[static_cast<size_t>(from)]; entry != kEnd; entry = one_before_[entry]) {
+    if (faces_[entry / 3][(entry + 1) % 3] == to) return static_cast<int32_t>(entry / 3);
+  }
+  return kNone;
+}
+
+std::vector<int32_t> BorderStitcher::FacesAround(int32_t v) const {
+  std::vector<int32_t> found;
+  for (uint32_t entry = last_at_vertex_[static_cast<size_t>(v)]; entry != kEnd; entry = one_before_[entry]) {
+    found.push_back(static_cast<int32_t>(entry / 3));
+  }
+  std::ranges::reverse(found);
+  return found;
+}
+
+void BorderStitcher::Release() const {
+  previous_in_part_.Release();
+  first_inner_edge_.Release();
+  corners_.Release();
+  open_at_vertex_.Release();
+  faces_.Release();
+  last_at_vertex_.Release();
+  one_before_.Release();
+}
 
 int64_t BorderStitcher::CountOpenEdges() const {
   return std::ranges::count_if(corners_, [](const Corner& corner) { return corner.open; });
@@ -139,10 +210,9 @@ std::vector<int32_t> BorderStitcher::VerticesWithSeveralGaps() const {
   return found;
 }
 
-void BorderStitcher::Drop(const std::vector<uint8_t>& drop) {
-  MW_CHECK(drop.size() == vertices_.size());
+void BorderStitcher::Drop(const std::function<bool(int32_t)>& is_dropped) {
   for (Corner& corner : corners_) {
-    if (drop[static_cast<size_t>(corner.vertex)] != 0 && corner.open) Close(corner);
+    if (corner.open && is_dropped(corner.vertex)) Close(corner);
   }
 }
 
@@ -155,9 +225,9 @@ void BorderStitcher::MakeGrid(int level) {
   const auto [grid, is_new] = grids_.try_emplace(level);
   if (!is_new) return;
   const double width = std::ldexp(1.0, level);
-  for (size_t v = 0; v < vertices_.size(); ++v) {
-    if (open_at_vertex_[v] > 0 && vertices_[v].spacing <= width) {
-      grid->second[CellOf(vertices_[v].position.cast<double>(), width)].push_back(static_cast<int32_t>(v));
+  for (const int32_t v : members_) {
+    if (open_at_vertex_[static_cast<size_t>(v)] > 0 && Vertex(v).spacing <= width) {
+      grid->second[CellOf(Position(v), width)].push_back(v);
     }
   }
 }
@@ -167,6 +237,15 @@ void BorderStitcher::MakeGrid(int level) {
 void BorderStitcher::FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found) {
   const int level = LevelOf(radius);
   const double width = std::ldexp(1.0, level);
+  const Eigen::AlignedBox3d box(x - Eigen::Vector3d::Constant(radius), x + Eigen::Vector3d::Constant(radius));
+  if (!near_block_.contains(box)) {
+    found = blocks_->PointsIn(box);
+    std::erase_if(found, [&](int32_t v) {
+      return open_at_vertex_[static_cast<size_t>(v)] == 0 || Vertex(v).spacing > width ||
+             !((Position(v) - x).squaredNorm() <= radius * radius);
+    });
+    return;
+  }
   auto& grid = grids_.at(level);
   found.clear();
   const std::array<int32_t, 3> low = CellOf(x - Eigen::Vector3d::Constant(radius), width);
@@ -309,7 +388,7 @@ void BorderStitcher::Apply(int32_t edge, int32_t corner, std::vector<int32_t>& c
   const int32_t a = VertexOf(edge);
   const int32_t b = VertexOf(end);
   const int32_t c = VertexOf(corner);
-  faces_.push_back({b, a, c});
+  AddFace({b, a, c});
   const bool after = At(end).next == corner;
   const bool before = At(edge).previous == corner;
   changed.clear();
@@ -319,13 +398,11 @@ void BorderStitcher::Apply(int32_t edge, int32_t corner, std::vector<int32_t>& c
     Close(At(end));
     At(edge).next = corner;
     At(corner).previous = edge;
-    AddEdge(a, c);
     changed = {edge};
   } else if (before) {
     Close(At(edge));
     At(corner).next = end;
     At(end).previous = corner;
-    AddEdge(c, b);
     changed = {corner};
   } else {
     const auto twin = static_cast<int32_t>(corners_.size());
@@ -336,8 +413,6 @@ void BorderStitcher::Apply(int32_t edge, int32_t corner, std::vector<int32_t>& c
     At(edge).next = twin;
     At(corner).next = end;
     At(end).previous = corner;
-    AddEdge(a, c);
-    AddEdge(c, b);
     changed = {edge, corner, twin};
   }
 }
@@ -402,58 +477,100 @@ void BorderStitcher::Advance(absl::Span<const int32_t> edges, const Scope& scope
   }
 }
 
-void BorderStitcher::StitchNearby(double reach, ThreadPool& pool, const std::function<void()>& step) {
-  std::vector<int32_t> edges(corners_.size());
-  for (size_t i = 0; i < edges.size(); ++i) edges[i] = static_cast<int32_t>(i);
-  const Scope scope = {.reach = reach, .min_normal_cosine = kMinSeamNormalCosine};
-  Steps looking(kStepsOfLooking, step);
-  const std::vector<Candidate> candidates =
-      BestForEach(edges, scope, pool, [&](double share) { looking.Reach(share); });
-  looking.Reach(1);
-  Steps stitching(kStepsOfStitching, step);
-  Advance(edges, scope, candidates, [&](double share) { stitching.Reach(share); });
-  stitching.Reach(1);
+void BorderStitcher::StitchBlock(const PointBlocks::Block& block, const Scope& scope, ThreadPool& pool,
+                                 const Progress& looking, const Progress& stitching) {
+  near_block_ = block.Grown(kMargin);
+  members_ = blocks_->PointsIn(near_block_);
+  // Beyond all points there is nothing to look for.
+  const Eigen::AlignedBox3d& all = blocks_->around_points();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    if (near_block_.min()[k] <= all.min()[k]) near_block_.min()[k] = -kInfinity;
+    if (near_block_.max()[k] >= all.max()[k]) near_block_.max()[k] = kInfinity;
+  }
+  std::vector<int32_t> edges;
+  for (const int32_t v : blocks_->Points(block)) {
+    for (int32_t corner = v; corner >= 0; corner = At(corner).sibling) edges.push_back(corner);
+  }
+  const std::vector<Candidate> candidates = BestForEach(edges, scope, pool, looking);
+  Advance(edges, scope, candidates, stitching);
   grids_.clear();
 }
 
-// A loop of open edges around a hole, and the borders of islands in it.
+void BorderStitcher::StitchNearby(double reach, const PointBlocks& blocks, ThreadPool& pool,
+                                  const std::function<void()>& step) {
+  const Scope scope = {.reach = reach, .min_normal_cosine = kMinSeamNormalCosine};
+  blocks_ = &blocks;
+  Steps steps(kStepsOfStitching, step);
+  const auto count = static_cast<double>(blocks.blocks().size());
+  double done = 0;
+  for (const PointBlocks::Block& block : blocks.blocks()) {
+    StitchBlock(
+        block, scope, pool, [&](double share) { steps.Reach((done + 0.5 * share) / count); },
+        [&](double share) { steps.Reach((done + 0.5 + 0.5 * share) / count); });
+    ++done;
+    blocks.Release();
+    Release();
+  }
+  steps.Reach(1);
+  blocks_ = nullptr;
+  members_ = {};
+}
+
+// A loop of open edges around a hole, or the border of an island in one.
 struct BorderStitcher::Hole {
-  Eigen::Vector3d center, normal;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double radius = 0;
-  bool has_islands = false;
-  std::vector<int32_t> corners;
+  // Of Holes::corners.
+  size_t first = 0;
+  size_t last = 0;
 };
 
-std::vector<BorderStitcher::Hole> BorderStitcher::FindHoles(double max_width) const {
-  std::vector<Hole> holes;
-  std::vector<Hole> islands;
-  std::vector<uint8_t> seen(corners_.size(), 0);
+struct BorderStitcher::Holes {
+  std::vector<Hole> holes = {};
+  std::vector<Hole> islands = {};
+  std::vector<std::pair<size_t, size_t>> island_of_hole = {};  // hole, island; ascending
+  SpooledVector<int32_t> corners;
+
+  absl::Span<const int32_t> CornersOf(const Hole& hole) const {
+    return absl::MakeConstSpan(corners.data() + hole.first, hole.last - hole.first);
+  }
+};
+
+BorderStitcher::Holes BorderStitcher::FindHoles(double max_width) const {
+  Holes found = {.corners = SpooledVector<int32_t>(spool_beside_)};
+  auto& [holes, islands, island_of_hole, corners] = found;
+  SpooledVector<uint8_t> seen(spool_beside_);
+  seen.assign(corners_.size(), 0);
   for (size_t i = 0; i < corners_.size(); ++i) {
     if (!corners_[i].open || seen[i] != 0) continue;
-    Hole loop;
+    Hole loop = {.first = corners.size()};
     Eigen::Vector3d center = Eigen::Vector3d::Zero();
     double spacing = 0;
     for (auto corner = static_cast<int32_t>(i); seen[static_cast<size_t>(corner)] == 0; corner = At(corner).next) {
       seen[static_cast<size_t>(corner)] = 1;
-      loop.corners.push_back(corner);
+      corners.push_back(corner);
       center += Position(VertexOf(corner));
       spacing += Vertex(VertexOf(corner)).spacing;
     }
-    const auto count = static_cast<double>(loop.corners.size());
+    loop.last = corners.size();
+    const absl::Span<const int32_t> of_loop = found.CornersOf(loop);
+    const auto count = static_cast<double>(of_loop.size());
     loop.center = center / count;
     spacing /= count;
     Eigen::Vector3d area = Eigen::Vector3d::Zero();
     Eigen::Vector3d normals = Eigen::Vector3d::Zero();
-    for (const int32_t corner : loop.corners) {
+    for (const int32_t corner : of_loop) {
       const Eigen::Vector3d x = Position(VertexOf(corner)) - loop.center;
       area += x.cross(Position(VertexOf(At(corner).next)) - loop.center);
       normals += Normal(VertexOf(corner));
       loop.radius = std::max(loop.radius, x.norm());
     }
-    if (2 * loop.radius > max_width * spacing || !(area.norm() > 0)) continue;
-    if (area.dot(normals) > 0) {  // the part lies inside
+    const bool fits_width = 2 * loop.radius <= max_width * spacing && area.norm() > 0;
+    if (fits_width && area.dot(normals) > 0) {  // the part lies inside
       loop.normal = area.normalized();
-      islands.push_back(std::move(loop));
+      islands.push_back(loop);
       continue;
     }
     loop.normal = -area.normalized();
@@ -464,8 +581,14 @@ std::vector<BorderStitcher::Hole> BorderStitcher::FindHoles(double max_width) co
       return Normal(v).dot(loop.normal) > kMinSheetCosine &&
              std::abs((Position(v) - loop.center).dot(loop.normal)) < 0.5 * loop.radius + 1.5 * spacing;
     };
-    const bool is_flat = static_cast<double>(std::ranges::count_if(loop.corners, fits)) >= kMinFlatShare * count;
-    if (is_slit || is_flat) holes.push_back(std::move(loop));
+    const auto is_flat = [&] {
+      return static_cast<double>(std::ranges::count_if(of_loop, fits)) >= kMinFlatShare * count;
+    };
+    if (fits_width && (is_slit || is_flat())) {
+      holes.push_back(loop);
+    } else {
+      corners.Shorten(loop.first);
+    }
   }
   // The first hole around each island; only holes near it along x are looked at.
   std::vector<std::pair<double, size_t>> by_x;
@@ -476,7 +599,8 @@ std::vector<BorderStitcher::Hole> BorderStitcher::FindHoles(double max_width) co
     largest = std::max(largest, holes[h].radius);
   }
   std::ranges::sort(by_x);
-  for (const Hole& island : islands) {
+  for (size_t i = 0; i < islands.size(); ++i) {
+    const Hole& island = islands[i];
     size_t around = holes.size();
     const double x = island.center.x();
     for (auto at = std::ranges::lower_bound(by_x, std::pair(x - largest, size_t{0}));
@@ -487,12 +611,10 @@ std::vector<BorderStitcher::Hole> BorderStitcher::FindHoles(double max_width) co
         around = std::min(around, at->second);
       }
     }
-    if (around == holes.size()) continue;
-    holes[around].has_islands = true;
-    std::vector<int32_t>& corners = holes[around].corners;
-    corners.insert(corners.end(), island.corners.begin(), island.corners.end());
+    if (around != holes.size()) island_of_hole.emplace_back(around, i);
   }
-  return holes;
+  std::ranges::sort(island_of_hole);
+  return found;
 }
 
 // The loop of gaps from one corner on, or nothing when it is longer than kMaxLoopCorners. A loop that comes to a vertex
@@ -540,8 +662,7 @@ void BorderStitcher::CloseLoops(absl::Span<const int32_t> corners) {
           TriangulateLoop(positions, normals, [&](int32_t i, int32_t j) { return !HasEdge(vertex(i), vertex(j)); });
       if (triangles.empty()) given_up.insert(loop.begin(), loop.end());
       for (const Face& triangle : triangles) {
-        faces_.push_back({vertex(triangle[0]), vertex(triangle[1]), vertex(triangle[2])});
-        for (size_t k = 0; k < 3; ++k) AddEdge(vertex(triangle[k]), vertex(triangle[(k + 1) % 3]));
+        AddFace({vertex(triangle[0]), vertex(triangle[1]), vertex(triangle[2])});
       }
       if (!triangles.empty()) {
         for (const int32_t corner : loop) Close(At(corner));
@@ -551,15 +672,23 @@ void BorderStitcher::CloseLoops(absl::Span<const int32_t> corners) {
 }
 
 int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>& step) {
-  const std::vector<Hole> holes = FindHoles(max_width);
+  const Holes found = FindHoles(max_width);
+  auto island = found.island_of_hole.begin();
+  std::vector<int32_t> corners;
   std::vector<int32_t> members;
   std::vector<Candidate> candidates;
-  Steps filling(kSteps - kStepsOfLooking - kStepsOfStitching, step);
-  for (size_t h = 0; h < holes.size(); ++h) {
-    const Hole& hole = holes[h];
-    filling.Reach(static_cast<double>(h) / static_cast<double>(holes.size()));
+  Steps filling(kSteps - kStepsOfStitching, step);
+  for (size_t h = 0; h < found.holes.size(); ++h) {
+    filling.Reach(static_cast<double>(h) / static_cast<double>(found.holes.size()));
+    const Hole& hole = found.holes[h];
+    const absl::Span<const int32_t> rim = found.CornersOf(hole);
+    corners.assign(rim.begin(), rim.end());
+    for (; island != found.island_of_hole.end() && island->first == h; ++island) {
+      const absl::Span<const int32_t> around_it = found.CornersOf(found.islands[island->second]);
+      corners.insert(corners.end(), around_it.begin(), around_it.end());
+    }
     members.clear();
-    for (const int32_t corner : hole.corners) members.push_back(VertexOf(corner));
+    for (const int32_t corner : corners) members.push_back(VertexOf(corner));
     std::ranges::sort(members);
     members.erase(std::unique(members.begin(), members.end()), members.end());
     const Scope scope = {.reach = std::numeric_limits<double>::infinity(),
@@ -567,16 +696,23 @@ int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>&
                          .members = &members,
                          .normal = &hole.normal};
     candidates.clear();
-    for (const int32_t edge : hole.corners) {
+    for (const int32_t edge : corners) {
       candidates.push_back(At(edge).open ? BestNow(edge, scope) : Candidate());
     }
-    Advance(hole.corners, scope, candidates, [](double) {});
-    if (!hole.has_islands) CloseLoops(hole.corners);
+    Advance(corners, scope, candidates, [](double) {});
+    if (corners.size() == rim.size()) CloseLoops(corners);  // it has no islands
+    if (h % kHolesAtOnce == 0) Release();
   }
   filling.Reach(1);
-  return std::ranges::count_if(holes, [&](const Hole& hole) {
-    return std::ranges::none_of(hole.corners, [&](int32_t corner) { return At(corner).open; });
-  });
+  std::vector<uint8_t> is_filled(found.holes.size(), 1);
+  const auto is_closed = [&](const Hole& loop) {
+    return std::ranges::none_of(found.CornersOf(loop), [&](int32_t corner) { return At(corner).open; });
+  };
+  for (size_t h = 0; h < is_filled.size(); ++h) is_filled[h] = is_closed(found.holes[h]) ? 1 : 0;
+  for (const auto& [h, i] : found.island_of_hole) {
+    if (!is_closed(found.islands[i])) is_filled[h] = 0;
+  }
+  return std::ranges::count(is_filled, 1);
 }
 
 std::pair<int32_t, int32_t> BorderStitcher::PlaceFor(const Face& triangle) const {

@@ -5,15 +5,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 #include <absl/container/flat_hash_map.h>
-#include <absl/container/flat_hash_set.h>
 #include <absl/types/span.h>
 
+#include "common/base/spooled_vector.h"
 #include "common/base/thread_pool.h"
+#include "common/mesh/point_blocks.h"
 
 namespace meshwright {
 
@@ -29,22 +31,30 @@ struct BorderVertex {
 // visible vertex that makes the largest angle over it, as a constrained Delaunay triangulation does, smallest
 // circumcircles first (cf. Bernardini et al. 1999). Only open edges take a triangle and no edge is made twice, so that
 // each edge has at most two triangles, and those run along it in opposite directions. The order, and so the result,
-// depends on the border alone.
+// depends on the border and the blocks alone.
+//
+// What grows with the border is spooled; memory holds a block of it at a time.
 class BorderStitcher {
  public:
   using Face = std::array<int32_t, 3>;  // border vertices, counter-clockwise seen from outside
 
-  // `inner_edges`: pairs of border vertices that an edge joins which has its two triangles already.
-  BorderStitcher(std::vector<BorderVertex> vertices, absl::Span<const std::pair<int32_t, int32_t>> inner_edges);
+  // Number of a face that is none.
+  static constexpr int32_t kNone = -1;
+
+  // `inner_edges`: pairs (v, w) of border vertices, v < w, ascending by v, that an edge joins which has its two triangles
+  // already. Vertices and edges must outlive the stitcher. What it needs is spooled beside `spool_beside` (SpooledBytes).
+  BorderStitcher(absl::Span<const BorderVertex> vertices, absl::Span<const std::pair<int32_t, int32_t>> inner_edges,
+                 const std::string& spool_beside = {});
 
   // Both of what takes long call `step` now and then, together kSteps times.
   static constexpr int kSteps = 60;
 
-  // Fills gaps wherever circumcircles have a radius of at most `reach` times the vertices' spacing.
-  void StitchNearby(double reach, ThreadPool& pool, const std::function<void()>& step);
+  // Fills gaps wherever circumcircles have a radius of at most `reach` times the vertices' spacing, those at the
+  // vertices of one block after those of the other.
+  void StitchNearby(double reach, const PointBlocks& blocks, ThreadPool& pool, const std::function<void()>& step);
 
-  // Takes the borders of all vertices with drop[vertex] out of the game.
-  void Drop(const std::vector<uint8_t>& drop);
+  // Takes the borders of all vertices that are to be dropped out of the game.
+  void Drop(const std::function<bool(int32_t v)>& is_dropped);
 
   // Fills loops around holes of at most `max_width` times the vertices' spacing, together with the islands in them:
   // slits whatever their rims look like, wider holes where the rims are nearly flat. Returns how many.
@@ -55,9 +65,16 @@ class BorderStitcher {
 
   // Whether a gap starts at the vertex.
   bool IsOpen(int32_t v) const { return open_at_vertex_[static_cast<size_t>(v)] > 0; }
-  const std::vector<BorderVertex>& vertices() const { return vertices_; }
-  const std::vector<Face>& faces() const { return faces_; }
+  absl::Span<const BorderVertex> vertices() const { return vertices_; }
+  // The edge from its first to its second vertex was open when a face was put over it.
+  absl::Span<const Face> faces() const { return absl::MakeConstSpan(faces_.data(), faces_.size()); }
+  // The face that has an edge from `from` to `to`, or kNone: a part may have it.
+  int32_t FaceAlong(int32_t from, int32_t to) const;
+  // Those that have the vertex, ascending.
+  std::vector<int32_t> FacesAround(int32_t v) const;
   int64_t CountOpenEdges() const;
+  // Where the part's border comes to the vertex from.
+  int32_t PreviousInPart(int32_t v) const { return previous_in_part_[static_cast<size_t>(v)]; }
   // Vertices that several gaps meet, ascending, with how many.
   std::vector<int32_t> VerticesWithSeveralGaps() const;
 
@@ -98,6 +115,7 @@ class BorderStitcher {
   static bool IsBlocked(absl::Span<const Segment> blockers, const Segment& segment);
   struct EdgeFrame;
   struct Hole;
+  struct Holes;
 
   // Of the edge that is looked at; kept so that its memory is.
   struct Scratch {
@@ -126,7 +144,7 @@ class BorderStitcher {
   Eigen::Vector3d NormalFor(int32_t v, const Scope& scope) const { return scope.normal ? *scope.normal : Normal(v); }
   void Close(Corner& corner);
   bool HasEdge(int32_t v, int32_t w) const;
-  void AddEdge(int32_t v, int32_t w);
+  void AddFace(const Face& face);
   void Apply(int32_t edge, int32_t corner, std::vector<int32_t>& changed);
   // `candidates`: what BestFor says of each edge now; none for those that are not open.
   void Advance(absl::Span<const int32_t> edges, const Scope& scope, absl::Span<const Candidate> candidates,
@@ -134,7 +152,11 @@ class BorderStitcher {
   double SearchRadius(int32_t edge, const Scope& scope) const;
   void MakeGrid(int level);
   void FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found);
-  std::vector<Hole> FindHoles(double max_width) const;
+  void StitchBlock(const PointBlocks::Block& block, const Scope& scope, ThreadPool& pool, const Progress& looking,
+                   const Progress& stitching);
+  // Gives memory back.
+  void Release() const;
+  Holes FindHoles(double max_width) const;
   std::vector<int32_t> CutSimpleLoop(int32_t first);
   void CloseLoops(absl::Span<const int32_t> corners);
 
@@ -145,12 +167,23 @@ class BorderStitcher {
   Eigen::Vector3d Position(int32_t v) const { return Vertex(v).position.cast<double>(); }
   Eigen::Vector3d Normal(int32_t v) const { return Vertex(v).normal.cast<double>(); }
 
-  std::vector<BorderVertex> vertices_;
-  std::vector<Corner> corners_;          // corner v is the first one of vertex v
-  std::vector<int32_t> open_at_vertex_;  // how many of its corners are open
-  std::vector<Face> faces_;
-  absl::flat_hash_set<std::pair<int32_t, int32_t>> edges_;
-  // Vertices in cubes of width 2^level; each grid is made when first asked for.
+  absl::Span<const BorderVertex> vertices_;
+  absl::Span<const std::pair<int32_t, int32_t>> inner_edges_;
+  std::string spool_beside_;
+  SpooledVector<int32_t> previous_in_part_;
+  SpooledVector<int32_t> first_inner_edge_;  // per vertex, and the end
+  SpooledVector<Corner> corners_;            // corner v is the first one of vertex v
+  SpooledVector<int32_t> open_at_vertex_;    // how many of its corners are open
+  SpooledVector<Face> faces_;
+  // Corner k of face f is entry 3 f + k of a list of all that are at its vertex.
+  static constexpr uint32_t kEnd = UINT32_MAX;
+  SpooledVector<uint32_t> last_at_vertex_;
+  SpooledVector<uint32_t> one_before_;
+  // What is stitched now, the vertices around it, and where all of them are.
+  const PointBlocks* blocks_ = nullptr;
+  Eigen::AlignedBox3d near_block_;
+  std::vector<int32_t> members_;
+  // These in cubes of width 2^level; each grid is made when first asked for.
   absl::flat_hash_map<int, absl::flat_hash_map<std::array<int32_t, 3>, std::vector<int32_t>>> grids_;
   Scratch scratch_;
 };

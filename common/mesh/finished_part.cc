@@ -54,9 +54,9 @@ double TriangleArea(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Ei
   return 0.5 * (b.cast<double>() - origin).cross(c.cast<double>() - origin).norm();
 }
 
-FinishedPart FinishPart(const SparseSurface& surface, const PartBorders::Part& part, const PartJoins& joins,
+FinishedPart FinishPart(const SparseSurface& surface, absl::Span<const uint8_t> trimmed, const PartJoins& joins,
                         int blend_steps, double simplify_footprints) {
-  const PartMesh part_mesh = BuildPartMesh(surface, std::vector<uint8_t>(part.trimmed.begin(), part.trimmed.end()));
+  const PartMesh part_mesh = BuildPartMesh(surface, std::vector<uint8_t>(trimmed.begin(), trimmed.end()));
   std::vector<std::array<uint8_t, 3>> colors = surface.rgb;
   BlendSeams(joins.offsets, blend_steps, surface, colors);
   FinishedPart finished;

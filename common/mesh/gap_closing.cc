@@ -5,9 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -18,6 +16,7 @@
 #include "common/base/status_macros.h"
 #include "common/closing/free_space_cut.h"
 #include "common/closing/surface_witness.h"
+#include "common/mesh/point_blocks.h"
 
 namespace meshwright {
 namespace {
@@ -42,20 +41,9 @@ struct ClosingPoint {
   int32_t part = 0;
 };
 
-// A box that shares no point with another block's: low <= x < high.
-struct Block {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
-  Eigen::Vector3d high = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
-  std::vector<int32_t> points;
-
-  bool Contains(const Eigen::Vector3d& x) const {
-    return (x.array() >= low.array()).all() && (x.array() < high.array()).all();
-  }
-};
-
-std::vector<ClosingPoint> CollectPoints(const PartBorders& borders, const std::function<bool(int32_t)>& is_open,
-                                        const std::vector<uint8_t>& is_small) {
-  std::vector<ClosingPoint> points;
+SpooledVector<ClosingPoint> CollectPoints(const PartBorders& borders, const std::function<bool(int32_t)>& is_open,
+                                          const std::vector<uint8_t>& is_small, const std::string& spool_beside) {
+  SpooledVector<ClosingPoint> points(spool_beside);
   for (size_t part = 0; part + 1 < borders.parts.size(); ++part) {
     const PartBorders::Part& from = borders.parts[part];
     const PartBorders::Part& to = borders.parts[part + 1];
@@ -73,55 +61,11 @@ std::vector<ClosingPoint> CollectPoints(const PartBorders& borders, const std::f
   return points;
 }
 
-// Halves the points along the longest side of their box until few enough are left.
-void Split(const std::vector<ClosingPoint>& points, Block block, std::vector<Block>& blocks) {
-  if (block.points.size() > kPointsOfBlock) {
-    const auto at = [&](int32_t i) { return points[static_cast<size_t>(i)].measured.x_in_world; };
-    Eigen::AlignedBox3d box;
-    for (const int32_t i : block.points) box.extend(at(i));
-    Eigen::Index axis = 0;
-    box.sizes().maxCoeff(&axis);
-    const auto middle = block.points.begin() + static_cast<std::ptrdiff_t>(block.points.size() / 2);
-    std::ranges::nth_element(block.points, middle, {}, [&](int32_t i) { return std::pair(at(i)[axis], i); });
-    const double border = at(*middle)[axis];
-    Block below = {.low = block.low, .high = block.high};
-    Block above = below;
-    below.high[axis] = border;
-    above.low[axis] = border;
-    for (const int32_t i : block.points) (at(i)[axis] < border ? below : above).points.push_back(i);
-    if (!below.points.empty()) {
-      Split(points, std::move(below), blocks);
-      Split(points, std::move(above), blocks);
-      return;
-    }
-  }
-  if (!block.points.empty()) blocks.push_back(std::move(block));
-}
-
-// False only if the camera cannot have measured anything in the box.
-bool MaySee(const PartBorders::Part& part, const Eigen::AlignedBox3d& box) {
-  const Camera& camera = part.camera;
-  const double radius = 0.5 * box.diagonal().norm();
-  const Eigen::Vector3d x = camera.CamFromWorld(box.center());
-  if (!(part.farthest > 0) || x.z() + radius < part.nearest || x.z() - radius > part.farthest) return false;
-  // Distances from the four planes through the camera's centre and the picture's sides.
-  const auto is_beyond = [&](double focal, double center_px, double size_px, double across) {
-    const double low = center_px / focal;
-    const double high = (size_px - center_px) / focal;
-    return -across - low * x.z() > radius * std::hypot(1, low) || across - high * x.z() > radius * std::hypot(1, high);
-  };
-  return !is_beyond(camera.fx, camera.cx, camera.width, x.x()) &&
-         !is_beyond(camera.fy, camera.cy, camera.height, x.y());
-}
-
 class BlockCloser {
  public:
-  BlockCloser(const PartBorders& borders, const std::vector<ClosingPoint>& points, double reach,
-              const LoadSurface& load)
-      : borders_(borders), points_(points), reach_(reach), load_(load) {
-    by_x_.resize(points.size());
-    std::iota(by_x_.begin(), by_x_.end(), 0);
-    std::ranges::sort(by_x_, {}, [&](int32_t i) { return std::pair(X(i), i); });
+  BlockCloser(const PartBorders& borders, const SpooledVector<ClosingPoint>& points, const PointBlocks& blocks,
+              double reach, const LoadSurface& load)
+      : borders_(borders), points_(points), blocks_(blocks), reach_(reach), load_(load) {
     // A camera's first part is what it has measured. A later one is what else it has come to: surface all the same,
     // which no triangle may hide.
     absl::flat_hash_set<CameraIndex> seen;
@@ -130,16 +74,13 @@ class BlockCloser {
     }
   }
 
-  absl::StatusOr<std::vector<BorderStitcher::Face>> TrianglesIn(const Block& block) const {
-    Eigen::AlignedBox3d box;
-    for (const int32_t i : block.points) box.extend(points_[static_cast<size_t>(i)].measured.x_in_world);
-    const double margin = kMargin * box.sizes().maxCoeff();
-    box.extend(box.min() - Eigen::Vector3d::Constant(margin));
-    box.extend(box.max() + Eigen::Vector3d::Constant(margin));
-    const std::vector<int32_t> around = PointsIn(box);
+  absl::StatusOr<std::vector<BorderStitcher::Face>> TrianglesIn(const PointBlocks::Block& block) const {
+    const Eigen::AlignedBox3d box = block.Grown(kMargin);
+    std::vector<int32_t> around = blocks_.PointsIn(box);
+    std::ranges::sort(around, {}, [&](int32_t i) { return std::pair(At(i).measured.x_in_world.x(), i); });
     std::vector<int64_t> seen_by;
     for (size_t part = 0; part < is_first_.size(); ++part) {
-      if (MaySee(borders_.parts[part], box)) seen_by.push_back(static_cast<int64_t>(part));
+      if (borders_.parts[part].space.MayReach(box.center(), 0.5 * box.diagonal().norm())) seen_by.push_back(static_cast<int64_t>(part));
     }
     MW_ASSIGN_OR_RETURN(const Triangles cut, Cut(around, seen_by));
     std::vector<Candidate> candidates;
@@ -168,7 +109,6 @@ class BlockCloser {
   };
 
   const ClosingPoint& At(int32_t i) const { return points_[static_cast<size_t>(i)]; }
-  double X(int32_t i) const { return At(i).measured.x_in_world.x(); }
 
   std::array<Eigen::Vector3d, 3> CornersOf(const Candidate& candidate) const {
     std::array<Eigen::Vector3d, 3> corners;
@@ -180,16 +120,6 @@ class BlockCloser {
     return (a + b + c) / 3;
   }
 
-  std::vector<int32_t> PointsIn(const Eigen::AlignedBox3d& box) const {
-    std::vector<int32_t> found;
-    const auto by_x = [&](int32_t i) { return X(i); };
-    for (auto i = std::ranges::lower_bound(by_x_, box.min().x(), {}, by_x); i != by_x_.end() && X(*i) <= box.max().x();
-         ++i) {
-      if (box.contains(At(*i).measured.x_in_world)) found.push_back(*i);
-    }
-    return found;
-  }
-
   // Of indices into `around`.
   absl::StatusOr<Triangles> Cut(const std::vector<int32_t>& around, const std::vector<int64_t>& seen_by) const {
     // A camera once, whatever parts of it there are.
@@ -197,7 +127,7 @@ class BlockCloser {
     absl::flat_hash_map<CameraIndex, int32_t> number;
     const auto number_of = [&](const PartBorders::Part& part) {
       const auto [found, is_new] = number.try_emplace(part.camera_index, static_cast<int32_t>(centers.size()));
-      if (is_new) centers.push_back(part.camera.center_in_world());
+      if (is_new) centers.push_back(part.space.camera.center_in_world());
       return found->second;
     };
     std::vector<MeasuredPoint> measured;
@@ -248,10 +178,10 @@ class BlockCloser {
   }
 
   const PartBorders& borders_;
-  const std::vector<ClosingPoint>& points_;
+  const SpooledVector<ClosingPoint>& points_;
+  const PointBlocks& blocks_;
   const double reach_;
   const LoadSurface& load_;
-  std::vector<int32_t> by_x_;
   std::vector<bool> is_first_;  // per part: of its camera
 };
 
@@ -262,18 +192,19 @@ absl::StatusOr<std::vector<BorderStitcher::Face>> FindGapTriangles(const PartBor
                                                                    const std::vector<uint8_t>& is_small, double reach,
                                                                    const LoadSurface& load, ThreadPool& pool,
                                                                    JoinProgress& progress) {
-  const std::vector<ClosingPoint> points = CollectPoints(borders, is_open, is_small);
-  std::vector<Block> blocks;
-  Block all;
-  all.points.resize(points.size());
-  std::iota(all.points.begin(), all.points.end(), 0);
-  Split(points, std::move(all), blocks);
-  const BlockCloser closer(borders, points, reach, load);
-  const auto count = static_cast<int64_t>(blocks.size());
-  std::vector<std::vector<BorderStitcher::Face>> of_block(blocks.size());
+  const SpooledVector<ClosingPoint> points = CollectPoints(borders, is_open, is_small, borders.spool_beside);
+  const PointBlocks blocks(
+      static_cast<int32_t>(points.size()),
+      [&](int32_t i) { return points[static_cast<size_t>(i)].measured.x_in_world; }, kPointsOfBlock, borders.spool_beside);
+  const BlockCloser closer(borders, points, blocks, reach, load);
+  const auto count = static_cast<int64_t>(blocks.blocks().size());
+  std::vector<std::vector<BorderStitcher::Face>> of_block(blocks.blocks().size());
   MW_RETURN_IF_ERROR(ForEachPart(0, count, pool, [&](int64_t i) -> absl::Status {
-    MW_ASSIGN_OR_RETURN(of_block[static_cast<size_t>(i)], closer.TrianglesIn(blocks[static_cast<size_t>(i)]));
+    const auto index = static_cast<size_t>(i);
+    MW_ASSIGN_OR_RETURN(of_block[index], closer.TrianglesIn(blocks.blocks()[index]));
     progress.Step(JoinStage::kClosing, count);
+    points.Release();
+    blocks.Release();
     return absl::OkStatus();
   }));
   std::vector<BorderStitcher::Face> faces;

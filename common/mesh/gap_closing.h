@@ -20,8 +20,8 @@ namespace meshwright {
 // photograph's longer side.
 //
 // `is_open`, per border vertex: it may take triangles. `is_small`, per component: it has been left out. Works in blocks
-// of vertices, one a thread, with the surfaces that see a block loaded one after the other, so memory grows with
-// neither photographs nor mesh. Depends on the surfaces and their order alone. Errors: those of `load`.
+// of vertices, one a thread, with the surfaces that see a block loaded one after the other, and spools what grows with
+// the mesh. Depends on the surfaces and their order alone. Errors: those of `load`.
 absl::StatusOr<std::vector<BorderStitcher::Face>> FindGapTriangles(const PartBorders& borders,
                                                                    const std::function<bool(int32_t)>& is_open,
                                                                    const std::vector<uint8_t>& is_small, double reach,

@@ -6,20 +6,21 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <utility>
 #include <vector>
 
-#include <absl/container/flat_hash_map.h>
+#include <absl/types/span.h>
 
 #include "common/base/check.h"
 #include "common/base/out_of_range.h"
+#include "common/base/spooled_vector.h"
 #include "common/base/status_macros.h"
 #include "common/mesh/border_stitching.h"
 #include "common/mesh/disjoint_sets.h"
 #include "common/mesh/finished_part.h"
 #include "common/mesh/gap_closing.h"
 #include "common/mesh/ply.h"
+#include "common/mesh/point_blocks.h"
 #include "common/mesh/seam_blending.h"
 
 namespace meshwright {
@@ -32,40 +33,43 @@ PlyAttributes AttributesWith(const Eigen::Vector3d& offset) {
 constexpr double kStitchReach = 2;
 // Offsets at a seam are averaged over this many vertices to either side, so that texture does not smear.
 constexpr int kSeamSmoothing = 8;
-
-// Border vertices of triangles without neighbours. They are noise, and to a stitcher their outside looks like a hole.
-std::vector<uint8_t> LoneTriangles(const PartBorders& borders) {
-  std::vector<uint8_t> lone(borders.origins.size());
-  for (size_t v = 0; v < lone.size(); ++v) {
-    lone[v] = borders.faces_of_component[static_cast<size_t>(borders.origins[v].component)] == 1 ? 1 : 0;
-  }
-  return lone;
-}
+constexpr size_t kFacesAtOnce = 65536;
 
 // Per component of a part: whether what it is joined to edge by edge has too few faces. A lone triangle always has.
-std::vector<uint8_t> SmallComponents(const PartBorders& borders, const std::vector<BorderStitcher::Face>& faces,
-                                     int64_t min_faces, int64_t& removed) {
+std::vector<uint8_t> SmallComponents(const PartBorders& borders, const BorderStitcher& stitcher, int64_t min_faces,
+                                     int64_t& removed) {
   const size_t components = borders.faces_of_component.size();
-  DisjointSets sets(components + faces.size());  // components, then faces
-  absl::flat_hash_map<std::pair<int32_t, int32_t>, int32_t> face_at_edge;
+  DisjointSets sets(components);
+  std::vector<int64_t> total = borders.faces_of_component;
+  SpooledVector<int32_t> component_of_face(borders.spool_beside);
+  const absl::Span<const BorderStitcher::Face> faces = stitcher.faces();
   for (size_t f = 0; f < faces.size(); ++f) {
-    const auto face = static_cast<int32_t>(components + f);
+    int32_t component = -1;
     for (size_t k = 0; k < 3; ++k) {
       const int32_t from = faces[f][k];
       const int32_t to = faces[f][(k + 1) % 3];
       // A part's border runs the other way.
+      int32_t other = -1;
       if (borders.vertices[static_cast<size_t>(to)].next == from) {
-        sets.Join(borders.origins[static_cast<size_t>(to)].component, face);
+        other = borders.origins[static_cast<size_t>(to)].component;
       } else {
-        const auto [other, is_new] = face_at_edge.try_emplace(std::minmax(from, to), face);
-        if (!is_new) sets.Join(other->second, face);
+        const int32_t face = stitcher.FaceAlong(to, from);
+        // Later ones will come to this one.
+        if (face != BorderStitcher::kNone && face < static_cast<int32_t>(f)) {
+          other = component_of_face[static_cast<size_t>(face)];
+        }
       }
+      if (other < 0) continue;
+      if (component >= 0) sets.Join(component, other);
+      component = other;
     }
+    MW_CHECK(component >= 0);  // each was put over an edge of what was there
+    component_of_face.push_back(component);
+    ++total[static_cast<size_t>(component)];
   }
-  std::vector<int64_t> total(components + faces.size(), 0);
-  for (size_t i = 0; i < total.size(); ++i) {
-    const auto root = static_cast<size_t>(sets.Root(static_cast<int32_t>(i)));
-    total[root] += i < components ? borders.faces_of_component[i] : 1;
+  for (size_t c = 0; c < components; ++c) {
+    const auto root = static_cast<size_t>(sets.Root(static_cast<int32_t>(c)));
+    if (root != c) total[root] += std::exchange(total[c], 0);
   }
   std::vector<uint8_t> small(components, 0);
   for (size_t c = 0; c < components; ++c) {
@@ -76,83 +80,79 @@ std::vector<uint8_t> SmallComponents(const PartBorders& borders, const std::vect
   return small;
 }
 
-// Half of what separates each vertex from those of other parts that it is stitched to.
-std::vector<std::optional<SeamOffset>> SeamOffsets(const PartBorders& borders,
-                                                   const std::vector<BorderVertex>& vertices,
-                                                   const std::vector<BorderStitcher::Face>& faces,
-                                                   const std::vector<uint8_t>& is_stitch) {
-  const size_t count = vertices.size();
-  std::vector<int32_t> part_of(count, 0);
-  for (size_t part = 0; part + 1 < borders.parts.size(); ++part) {
-    std::fill(part_of.begin() + borders.parts[part].first_border,
-              part_of.begin() + borders.parts[part + 1].first_border, static_cast<int32_t>(part));
-  }
-  std::vector<Eigen::Vector3f> sum(count, Eigen::Vector3f::Zero());
-  std::vector<float> weight(count, 0);
-  for (size_t f = 0; f < faces.size(); ++f) {
-    if (is_stitch[f] == 0) continue;
-    for (const int32_t i : faces[f]) {
-      for (const int32_t j : faces[f]) {
-        const auto v = static_cast<size_t>(i);
-        const auto w = static_cast<size_t>(j);
-        if (part_of[v] == part_of[w]) continue;
+// How a border vertex differs from those of other parts that it is stitched to, in grey levels.
+struct SeamDifference {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  float weight = 0;
+};
+
+SpooledVector<SeamDifference> SeamDifferences(const PartBorders& borders,
+                                              absl::Span<const BorderStitcher::Face> stitches) {
+  SpooledVector<SeamDifference> differences(borders.spool_beside);
+  differences.assign(borders.origins.size(), {});
+  for (const BorderStitcher::Face& face : stitches) {
+    std::array<size_t, 3> parts = {};
+    std::ranges::transform(face, parts.begin(), [&](int32_t v) { return borders.PartOf(v); });
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t j = 0; j < 3; ++j) {
+        if (parts[i] == parts[j]) continue;
+        const auto v = static_cast<size_t>(face[i]);
+        const auto w = static_cast<size_t>(face[j]);
         Eigen::Vector3f offset;
         for (int k = 0; k < 3; ++k) {
           offset[k] = static_cast<float>(borders.origins[w].color[static_cast<size_t>(k)]) -
                       static_cast<float>(borders.origins[v].color[static_cast<size_t>(k)]);
         }
-        sum[v] += offset;
-        weight[v] += 1;
+        differences[v].sum += offset;
+        differences[v].weight += 1;
       }
     }
   }
-  std::vector<std::optional<SeamOffset>> offsets(count);
-  std::vector<int32_t> previous(count, 0);
-  for (size_t v = 0; v < count; ++v) previous[static_cast<size_t>(vertices[v].next)] = static_cast<int32_t>(v);
-  for (size_t v = 0; v < count; ++v) {
-    if (weight[v] == 0) continue;
-    Eigen::Vector3f total = sum[v];
-    float total_weight = weight[v];
+  return differences;
+}
+
+// Half of what separates each border vertex of the part from other parts.
+std::vector<SeamOffset> SeamOffsets(const PartBorders& borders, const SpooledVector<SeamDifference>& differences,
+                                    size_t part) {
+  const auto first = static_cast<size_t>(borders.parts[part].first_border);
+  const auto last = static_cast<size_t>(borders.parts[part + 1].first_border);
+  const auto next = [&](size_t v) { return static_cast<size_t>(borders.vertices[v].next); };
+  std::vector<size_t> previous(last - first);
+  for (size_t v = first; v < last; ++v) previous[next(v) - first] = v;
+  std::vector<SeamOffset> offsets;
+  for (size_t v = first; v < last; ++v) {
+    if (differences[v].weight == 0) continue;
+    Eigen::Vector3f total = differences[v].sum;
+    float total_weight = differences[v].weight;
     size_t before = v;
     size_t after = v;
     for (int k = 0; k < kSeamSmoothing; ++k) {
-      before = static_cast<size_t>(previous[before]);
-      after = static_cast<size_t>(vertices[after].next);
-      total += sum[before] + sum[after];
-      total_weight += weight[before] + weight[after];
+      before = previous[before - first];
+      after = next(after);
+      total += differences[before].sum + differences[after].sum;
+      total_weight += differences[before].weight + differences[after].weight;
     }
     total *= 0.5F / total_weight;
-    offsets[v] = SeamOffset{borders.origins[v].patch, total};
+    offsets.push_back({borders.origins[v].patch, total});
   }
   return offsets;
 }
 
 // A vertex at which several gaps meet would join fans of triangles in a point only. Each fan but the one that lies in
-// its part gets a copy of the vertex, numbered from `vertices` on. Returns what is copied.
-std::vector<int32_t> SplitPoints(const BorderStitcher& stitcher, std::vector<BorderStitcher::Face>& faces) {
-  const std::vector<int32_t> points = stitcher.VerticesWithSeveralGaps();
-  std::vector<int32_t> slot_of_vertex(stitcher.vertices().size(), -1);
-  for (size_t i = 0; i < points.size(); ++i) slot_of_vertex[static_cast<size_t>(points[i])] = static_cast<int32_t>(i);
-  std::vector<std::vector<std::pair<size_t, size_t>>> corners(points.size());  // face, corner
-  for (size_t f = 0; f < faces.size(); ++f) {
-    for (size_t k = 0; k < 3; ++k) {
-      const int32_t slot = slot_of_vertex[static_cast<size_t>(faces[f][k])];
-      if (slot >= 0) corners[static_cast<size_t>(slot)].emplace_back(f, k);
-    }
-  }
-  std::vector<int32_t> previous(stitcher.vertices().size(), 0);
-  for (size_t v = 0; v < previous.size(); ++v) {
-    previous[static_cast<size_t>(stitcher.vertices()[v].next)] = static_cast<int32_t>(v);
-  }
-  const std::vector<BorderStitcher::Face> original = faces;
+// its part gets a copy of the vertex in `faces`, which are the stitcher's, numbered behind its vertices. Returns what is
+// copied.
+std::vector<int32_t> SplitPoints(const BorderStitcher& stitcher, SpooledVector<BorderStitcher::Face>& faces) {
   std::vector<int32_t> copies;
-  for (size_t i = 0; i < points.size(); ++i) {
-    const auto& around = corners[i];
+  for (const int32_t point : stitcher.VerticesWithSeveralGaps()) {
+    const std::vector<int32_t> around = stitcher.FacesAround(point);
     // The last one stands for the fan in the part.
     std::vector<std::pair<int32_t, int32_t>> ends;  // the face's next corner and the one after that
-    for (const auto& [f, k] : around) ends.emplace_back(original[f][(k + 1) % 3], original[f][(k + 2) % 3]);
-    ends.emplace_back(stitcher.vertices()[static_cast<size_t>(points[i])].next,
-                      previous[static_cast<size_t>(points[i])]);
+    for (const int32_t f : around) {
+      const BorderStitcher::Face& face = stitcher.faces()[static_cast<size_t>(f)];
+      const auto k = static_cast<size_t>(std::ranges::find(face, point) - face.begin());
+      ends.emplace_back(face[(k + 1) % 3], face[(k + 2) % 3]);
+    }
+    ends.emplace_back(stitcher.vertices()[static_cast<size_t>(point)].next, stitcher.PreviousInPart(point));
     DisjointSets fans(ends.size());
     for (size_t x = 0; x < ends.size(); ++x) {
       for (size_t y = 0; y < ends.size(); ++y) {
@@ -167,9 +167,11 @@ std::vector<int32_t> SplitPoints(const BorderStitcher& stitcher, std::vector<Bor
       int32_t& copy = copy_of_fan[static_cast<size_t>(fan)];
       if (copy < 0) {
         copy = static_cast<int32_t>(stitcher.vertices().size() + copies.size());
-        copies.push_back(points[i]);
+        copies.push_back(point);
       }
-      faces[around[x].first][around[x].second] = copy;
+      const auto f = static_cast<size_t>(around[x]);
+      const BorderStitcher::Face& face = stitcher.faces()[f];
+      faces[f][static_cast<size_t>(std::ranges::find(face, point) - face.begin())] = copy;
     }
   }
   return copies;
@@ -185,25 +187,45 @@ void AppendVertex(const TriangleMesh& from, size_t vertex, TriangleMesh& to) {
 
 // Everything about the joins that the writing of parts needs.
 struct Joins {
-  std::vector<BorderStitcher::Face> faces;  // border vertices, and copies of them numbered behind
-  std::vector<int32_t> copies;              // the border vertex that each is a copy of
-  std::vector<std::optional<SeamOffset>> offsets;
+  explicit Joins(const std::string& spool_beside)
+      : faces(spool_beside), differences(spool_beside), edges(spool_beside) {}
+
+  void Release() const {
+    faces.Release();
+    differences.Release();
+    edges.Release();
+  }
+
+  SpooledVector<BorderStitcher::Face> faces;  // border vertices, and copies of them numbered behind
+  std::vector<int32_t> copies;                // the border vertex that each is a copy of, ascending
+  SpooledVector<SeamDifference> differences;
   std::vector<uint8_t> small;  // per component: to be left out
-  // (from, to) of the faces between vertices that are no copies, ascending.
-  std::vector<std::pair<int32_t, int32_t>> edges;
+  // (from, to) of the faces between vertices of one part that are no copies, ascending.
+  SpooledVector<std::pair<int32_t, int32_t>> edges;
 };
 
-std::vector<std::pair<int32_t, int32_t>> SortedEdges(const std::vector<BorderStitcher::Face>& faces, int32_t vertices) {
-  std::vector<std::pair<int32_t, int32_t>> edges;
-  for (const auto& face : faces) {
+void CollectEdges(const PartBorders& borders, Joins& joins) {
+  const auto vertices = static_cast<int32_t>(borders.vertices.size());
+  for (const BorderStitcher::Face& face : joins.faces) {
     for (size_t k = 0; k < 3; ++k) {
       const int32_t from = face[k];
       const int32_t to = face[(k + 1) % 3];
-      if (from < vertices && to < vertices) edges.emplace_back(from, to);
+      if (from < vertices && to < vertices && borders.PartOf(from) == borders.PartOf(to)) {
+        joins.edges.push_back({from, to});
+      }
     }
   }
-  std::ranges::sort(edges);
-  return edges;
+  std::sort(joins.edges.begin(), joins.edges.end());
+}
+
+// Sews them on, a block's worth after the other.
+int64_t SewOn(absl::Span<const BorderStitcher::Face> triangles, const JoinOptions& options, BorderStitcher& stitcher) {
+  const auto at_once = static_cast<size_t>(options.vertices_of_block);
+  int64_t sewn = 0;
+  for (; !triangles.empty(); triangles.remove_prefix(std::min(at_once, triangles.size()))) {
+    sewn += stitcher.SewOn(triangles.subspan(0, at_once));
+  }
+  return sewn;
 }
 
 // Stitches all but the components that are small, and finds which are. Triangles to crumbs keep others from meeting:
@@ -211,21 +233,26 @@ std::vector<std::pair<int32_t, int32_t>> SortedEdges(const std::vector<BorderSti
 BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, ThreadPool& pool,
                         JoinProgress& progress, std::vector<uint8_t>& small, JoinedMeshCounts& counts) {
   small.assign(borders.faces_of_component.size(), 0);
-  const std::vector<uint8_t> lone = LoneTriangles(borders);
+  const PointBlocks blocks(
+      static_cast<int32_t>(borders.vertices.size()),
+      [&](int32_t v) { return borders.vertices[static_cast<size_t>(v)].position.cast<double>(); },
+      static_cast<size_t>(options.vertices_of_block), borders.spool_beside);
   std::function<void()> step = [&] { progress.Step(JoinStage::kStitching, BorderStitcher::kSteps); };
-  std::vector<BorderStitcher::Face> stays;
+  SpooledVector<BorderStitcher::Face> stays(borders.spool_beside);
   while (true) {
-    BorderStitcher stitcher(borders.vertices, borders.inner_edges);
-    std::vector<uint8_t> drop = lone;
-    for (size_t v = 0; v < drop.size(); ++v) {
-      if (small[static_cast<size_t>(borders.origins[v].component)] != 0) drop[v] = 1;
-    }
-    stitcher.Drop(drop);
-    stitcher.SewOn(stays);
-    stitcher.StitchNearby(kStitchReach, pool, step);
+    BorderStitcher stitcher(absl::MakeConstSpan(borders.vertices.data(), borders.vertices.size()),
+                            absl::MakeConstSpan(borders.inner_edges.data(), borders.inner_edges.size()),
+                            borders.spool_beside);
+    // Lone triangles are noise, and to a stitcher their outside looks like a hole.
+    stitcher.Drop([&](int32_t v) {
+      const auto component = static_cast<size_t>(borders.origins[static_cast<size_t>(v)].component);
+      return small[component] != 0 || borders.faces_of_component[component] == 1;
+    });
+    SewOn(absl::MakeConstSpan(stays.data(), stays.size()), options, stitcher);
+    stitcher.StitchNearby(kStitchReach, blocks, pool, step);
     step = [] {};
     int64_t removed = 0;
-    std::vector<uint8_t> now_small = SmallComponents(borders, stitcher.faces(), options.min_component_faces, removed);
+    std::vector<uint8_t> now_small = SmallComponents(borders, stitcher, options.min_component_faces, removed);
     if (now_small == small) {
       counts.components_removed = removed;
       return stitcher;
@@ -234,14 +261,17 @@ BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, 
     const auto is_small = [&](int32_t v) {
       return small[static_cast<size_t>(borders.origins[static_cast<size_t>(v)].component)] != 0;
     };
-    stays = stitcher.faces();
-    std::erase_if(stays, [&](const BorderStitcher::Face& face) { return std::ranges::any_of(face, is_small); });
+    stays.Shorten(0);
+    for (const BorderStitcher::Face& face : stitcher.faces()) {
+      if (std::ranges::none_of(face, is_small)) stays.push_back(face);
+    }
+    borders.Release();
   }
 }
 
 absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions& options, const LoadSurface& load,
                                   ThreadPool& pool, JoinProgress& progress, JoinedMeshCounts& counts) {
-  Joins joins;
+  Joins joins(borders.spool_beside);
   BorderStitcher stitcher = Stitched(borders, options, pool, progress, joins.small, counts);
   const size_t stitch_faces = stitcher.faces().size();
   const auto step = [&] { progress.Step(JoinStage::kStitching, BorderStitcher::kSteps); };
@@ -251,26 +281,21 @@ absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions&
                         FindGapTriangles(
                             borders, [&](int32_t v) { return stitcher.IsOpen(v); }, joins.small, options.close_reach,
                             load, pool, progress));
-    counts.closing_faces = stitcher.SewOn(triangles);
+    counts.closing_faces = SewOn(triangles, options, stitcher);
     // What it has left open is small now.
     counts.holes_filled += stitcher.FillHoles(options.max_hole_steps, [] {});
   }
   counts.border_edges_after = stitcher.CountOpenEdges();
-
-  joins.faces = stitcher.faces();
-  std::vector<uint8_t> is_stitch(joins.faces.size(), 0);
-  std::fill(is_stitch.begin(), is_stitch.begin() + static_cast<int64_t>(stitch_faces), 1);
-  joins.offsets = SeamOffsets(borders, stitcher.vertices(), joins.faces, is_stitch);
   counts.stitch_faces = static_cast<int64_t>(stitch_faces);
-  counts.hole_faces = static_cast<int64_t>(joins.faces.size() - stitch_faces) - counts.closing_faces;
+  counts.hole_faces = static_cast<int64_t>(stitcher.faces().size() - stitch_faces) - counts.closing_faces;
+  joins.differences = SeamDifferences(borders, stitcher.faces().subspan(0, stitch_faces));
   const auto position = [&](int32_t v) { return stitcher.vertices()[static_cast<size_t>(v)].position; };
-  for (const auto& face : joins.faces) {
+  for (const auto& face : stitcher.faces()) {
     counts.area += TriangleArea(position(face[0]), position(face[1]), position(face[2]));
   }
+  joins.faces.Append(stitcher.faces());
   joins.copies = SplitPoints(stitcher, joins.faces);
-  if (options.simplify_footprints > 0) {
-    joins.edges = SortedEdges(joins.faces, static_cast<int32_t>(stitcher.vertices().size()));
-  }
+  if (options.simplify_footprints > 0) CollectEdges(borders, joins);
   return joins;
 }
 
@@ -278,15 +303,12 @@ absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions&
 PartJoins JoinsOfPart(const PartBorders& borders, const Joins& joins, size_t index) {
   const PartBorders::Part& part = borders.parts[index];
   const int32_t end = borders.parts[index + 1].first_border;
-  PartJoins of_part = {.small = joins.small.data() + part.first_component};
-  for (int32_t v = part.first_border; v < end; ++v) {
-    const std::optional<SeamOffset>& offset = joins.offsets[static_cast<size_t>(v)];
-    if (offset.has_value()) of_part.offsets.push_back(*offset);
-  }
+  PartJoins of_part = {.small = joins.small.data() + part.first_component,
+                       .offsets = SeamOffsets(borders, joins.differences, index)};
   const auto vertex = [&](int32_t v) { return static_cast<uint32_t>(borders.origins[static_cast<size_t>(v)].vertex); };
-  auto edge = std::ranges::lower_bound(joins.edges, std::pair(part.first_border, int32_t{0}));
+  const auto* edge =
+      std::lower_bound(joins.edges.begin(), joins.edges.end(), std::pair(part.first_border, int32_t{0}));
   for (; edge != joins.edges.end() && edge->first < end; ++edge) {
-    if (edge->second < part.first_border || edge->second >= end) continue;
     of_part.edges.emplace_back(vertex(edge->first), vertex(edge->second));
   }
   return of_part;
@@ -299,9 +321,8 @@ class PartWriter {
       : borders_(borders),
         joins_(joins),
         writer_(writer),
-        index_of_border_(borders.origins.size() + joins.copies.size(), 0),
-        is_copied_(borders.origins.size(), 0) {
-    for (const int32_t v : joins.copies) is_copied_[static_cast<size_t>(v)] = 1;
+        index_of_border_(borders.spool_beside) {
+    index_of_border_.assign(borders.origins.size() + joins.copies.size(), 0);
   }
 
   absl::Status Append(int64_t part, const FinishedPart& finished) {
@@ -311,7 +332,7 @@ class PartWriter {
       const int32_t at = finished.index[static_cast<size_t>(borders_.origins[v].vertex)];
       if (at < 0) continue;
       index_of_border_[v] = static_cast<uint32_t>(writer_.vertices() + at);
-      if (is_copied_[v] == 0) continue;
+      if (!std::ranges::binary_search(joins_.copies, border)) continue;
       AppendVertex(finished.mesh, static_cast<size_t>(at), copied_vertices_);
       copied_borders_.push_back(border);
     }
@@ -328,20 +349,23 @@ class PartWriter {
     }
     MW_RETURN_IF_ERROR(writer_.Append(copies));
     std::vector<std::array<uint32_t, 3>> faces;
-    faces.reserve(joins_.faces.size());
-    for (const auto& face : joins_.faces) {
+    for (size_t f = 0; f < joins_.faces.size(); ++f) {
       std::array<uint32_t, 3>& corners = faces.emplace_back();
-      for (size_t k = 0; k < 3; ++k) corners[k] = index_of_border_[static_cast<size_t>(face[k])];
+      for (size_t k = 0; k < 3; ++k) corners[k] = index_of_border_[static_cast<size_t>(joins_.faces[f][k])];
+      if (faces.size() < kFacesAtOnce && f + 1 < joins_.faces.size()) continue;
+      MW_RETURN_IF_ERROR(writer_.AppendFaces(faces));
+      faces.clear();
     }
-    return writer_.AppendFaces(faces);
+    return absl::OkStatus();
   }
+
+  void Release() const { index_of_border_.Release(); }
 
  private:
   const PartBorders& borders_;
   const Joins& joins_;
   PlyStreamWriter& writer_;
-  std::vector<uint32_t> index_of_border_;  // and of the copies, in the file
-  std::vector<uint8_t> is_copied_;
+  SpooledVector<uint32_t> index_of_border_;  // and of the copies, in the file
   TriangleMesh copied_vertices_;
   std::vector<int32_t> copied_borders_;  // ascending
 };
@@ -358,6 +382,7 @@ absl::Status JoinOptions::Validate() const {
   if (!(simplify_footprints >= 0 && simplify_footprints <= 100)) {
     return OutOfRange("simplify_footprints", simplify_footprints, "0 to 100 pixel footprints");
   }
+  if (vertices_of_block <= 0) return OutOfRange("vertices_of_block", vertices_of_block, "more than 0");
   return absl::OkStatus();
 }
 
@@ -367,18 +392,16 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
   MW_RETURN_IF_ERROR(options.Validate());
   JoinedMeshCounts counts;
   JoinProgress progress(listener);
-  MW_ASSIGN_OR_RETURN(PartBorders borders, FindPartBorders(count, load, pool, progress));
+  MW_ASSIGN_OR_RETURN(PartBorders borders, FindPartBorders(count, load, path, pool, progress));
   counts.border_edges_before = static_cast<int64_t>(borders.vertices.size());
+  counts.patches_trimmed = std::count(borders.trimmed.begin(), borders.trimmed.end(), 1);
   std::vector<int64_t> patches;
   for (size_t i = 0; i < static_cast<size_t>(count); ++i) {
-    const std::vector<bool>& trimmed = borders.parts[i].trimmed;
-    patches.push_back(static_cast<int64_t>(trimmed.size()));
-    counts.patches_trimmed += std::ranges::count(trimmed, true);
+    patches.push_back(static_cast<int64_t>(borders.Trimmed(i).size()));
   }
   MW_ASSIGN_OR_RETURN(const Joins joins, JoinBorders(borders, options, load, pool, progress, counts));
-  borders.vertices = {};
-  borders.inner = {};
-  borders.inner_edges = {};
+  borders.inner = SpooledVector<InnerSample>();
+  borders.inner_edges = SpooledVector<std::pair<int32_t, int32_t>>();
 
   MW_ASSIGN_OR_RETURN(PlyStreamWriter writer, PlyStreamWriter::Create(path, AttributesWith(offset)));
   PartWriter part_writer(borders, joins, writer);
@@ -388,7 +411,7 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
       const auto index = static_cast<size_t>(i);
       MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load(i));
       parts[static_cast<size_t>(i - first)] =
-          FinishPart(*surface, borders.parts[index], JoinsOfPart(borders, joins, index), options.blend_steps,
+          FinishPart(*surface, borders.Trimmed(index), JoinsOfPart(borders, joins, index), options.blend_steps,
                      options.simplify_footprints);
       return absl::OkStatus();
     }));
@@ -399,6 +422,9 @@ absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(int64_t count, const LoadSurfac
       MW_RETURN_IF_ERROR(part_writer.Append(i, part));
       progress.Step(JoinStage::kWriting, count);
     }
+    borders.Release();
+    joins.Release();
+    part_writer.Release();
   }
   MW_RETURN_IF_ERROR(part_writer.AppendJoins());
   MW_RETURN_IF_ERROR(writer.Commit());

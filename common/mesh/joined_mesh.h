@@ -27,6 +27,8 @@ struct JoinOptions {
   // Within each part triangles become fewer up to this error (SimplifyFaces). Pixel footprints g = z / f, the median of
   // the part's vertices, 0 .. 100; 0: none are left out.
   double simplify_footprints = 0;
+  // Border vertices that are stitched at a time: what that takes of memory is some 100 bytes each. > 0.
+  int64_t vertices_of_block = 500'000;
 
   absl::Status Validate() const;
 };
@@ -50,11 +52,12 @@ struct JoinedMeshCounts {
 // into one mesh and writes it as PLY, with `offset` added (Scene::offset). Where surfaces overlap, the earlier one
 // stays. Borders that come close are stitched, holes filled, gaps closed, small pieces left out, colours run into each
 // other at the seams; positions stay. Parts are simplified one by one if wanted, all but their borders. Every edge has
-// one or two triangles, and two run along it in opposite directions. The bytes depend on the surfaces and their order
-// alone, not on the threads.
+// one or two triangles, and two run along it in opposite directions. The bytes depend on the surfaces, their order and
+// the options alone, not on the threads.
 //
-// Loads each surface a few times, a few of them at a time, and keeps the vertices on borders of all of them (some 300
-// bytes each, and 1/4 byte for each patch). Errors: those of `load` or of PlyStreamWriter, InvalidArgument for options;
+// Loads each surface a few times, a few of them at a time. Borders of all of them are spooled in nameless files beside
+// `path` (some 150 bytes for each of their vertices, and 1 byte for each patch) and worked on in blocks of neighbours,
+// so that memory does not grow with them; where there is no room for such files they stay in memory. Errors: those of `load` or of PlyStreamWriter, InvalidArgument for options;
 // then no file appears.
 absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(
     int64_t count, const LoadSurface& load, const JoinOptions& options, const Eigen::Vector3d& offset,

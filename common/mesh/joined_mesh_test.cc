@@ -500,6 +500,44 @@ TEST_F(JoinedMeshTest, SameBytesForAnyNumberOfThreads) {
   }
 }
 
+TEST_F(JoinedMeshTest, BlocksFitEachOther) {
+  const auto rim_of_hole = [](double x, double y) { return std::hypot(x, y) > 0.1; };
+  const std::vector<PatchLattice> surfaces = {PlaneSeenBy(0, left_, rim_of_hole), PlaneSeenBy(1, right_, rim_of_hole)};
+  const TriangleMesh whole = Join(surfaces, {});
+  const JoinedMeshCounts counts = counts_;
+  for (const int64_t block : {200, 50, 10}) {
+    const JoinOptions options = {.vertices_of_block = block};
+    const TriangleMesh mesh = Join(surfaces, options);
+    EXPECT_EQ(CountComponents(mesh), 1) << block;
+    EXPECT_EQ(CountLoops(BorderOf(mesh)), CountLoops(BorderOf(whole))) << block;
+    EXPECT_NEAR(static_cast<double>(counts_.stitch_faces), static_cast<double>(counts.stitch_faces),
+                0.01 * static_cast<double>(counts.stitch_faces));
+    EXPECT_EQ(counts_.holes_filled, counts.holes_filled);
+    for (double y = -0.2; y < 0.2; y += 0.0371) {
+      for (double x = -0.55; x < 0.5; x += 0.0233) EXPECT_EQ(LayersAt(mesh, x, y), 1) << x << " " << y;
+    }
+    const std::string bytes = *ReadFile(Path());
+    Join(surfaces, options, 3);
+    EXPECT_TRUE(*ReadFile(Path()) == bytes) << "it depends on the number of threads";
+  }
+}
+
+TEST_F(JoinedMeshTest, WhateverTheBlocksEdgesAreManifold) {
+  for (uint32_t seed = 0; seed < 12; ++seed) {
+    const std::vector<PatchLattice> surfaces = RandomParts(seed, 0.5 + 0.04 * seed, 0.9);
+    const JoinOptions options = {.min_component_faces = static_cast<int64_t>(seed % 3) * 5,
+                                 .simplify_footprints = seed % 2 == 0 ? 0.0 : 1.0};
+    Join(surfaces, options);
+    const auto whole = static_cast<double>(counts_.stitch_faces);
+    for (const int64_t block : {1000, 100, 1}) {
+      JoinOptions in_blocks = options;
+      in_blocks.vertices_of_block = block;
+      Join(surfaces, in_blocks);
+      EXPECT_NEAR(static_cast<double>(counts_.stitch_faces), whole, 0.1 * whole) << block;
+    }
+  }
+}
+
 TEST_F(JoinedMeshTest, NothingAcceptedIsAnEmptyMesh) {
   EXPECT_TRUE(Join({}, {}).positions.empty());
   EXPECT_TRUE(Join({PatchLattice::Empty(0, left_, 2)}, {}).positions.empty());
@@ -525,6 +563,7 @@ TEST(JoinOptionsTest, RefusesValuesOutOfRange) {
     EXPECT_THAT(JoinOptions{.simplify_footprints = g}.Validate().ToString(), testing::HasSubstr("simplify_footprints"));
   }
   EXPECT_TRUE(JoinOptions{.simplify_footprints = 100}.Validate().ok());
+  EXPECT_THAT(JoinOptions{.vertices_of_block = 0}.Validate().ToString(), testing::HasSubstr("vertices_of_block"));
 }
 
 }  // namespace

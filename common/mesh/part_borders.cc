@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <optional>
+#include <memory>
 
+#include "common/base/lru_cache.h"
 #include "common/base/status_macros.h"
 #include "common/geometry/level_of_detail.h"
 #include "common/mesh/part_mesh.h"
@@ -21,15 +22,28 @@ constexpr int kSampleSteps = 8;
 // Patches of parts worked on at the same time, some 150 bytes each.
 constexpr int64_t kMostPatchesAtOnce = 1'000'000;
 
-// What decides which surfaces have to be compared, kept of all of them.
+// Sketches kept while parts are compared with each other.
+constexpr int64_t kSketchBytes = int64_t{64} << 20;
+
+// What decides which surfaces have to be compared.
 struct Sketch {
   SurfaceOutline outline;
   std::vector<bool> in_triangle;
+
+  int64_t bytes() const { return outline.bytes() + static_cast<int64_t>(in_triangle.size() / 8); }
+};
+using Sketches = LruCache<int64_t, Sketch>;
+
+// What is kept of every surface.
+struct Extent {
+  MeasuredSpace space;
+  Lattice lattice;
 };
 
 // One part as if it were the first.
 struct OnePart {
   PartBorders::Part part;
+  std::vector<uint8_t> trimmed;
   std::vector<BorderVertex> vertices;
   std::vector<BorderOrigin> origins;
   std::vector<InnerSample> inner;
@@ -74,6 +88,7 @@ void FindBorder(const SparseSurface& surface, const PartMesh& mesh, OnePart& par
       }
     }
   }
+  std::ranges::sort(part.inner_edges);
   part.faces_of_component = mesh.faces_of_component;
 }
 
@@ -98,28 +113,25 @@ std::vector<InnerSample> SampleInside(const SparseSurface& surface, const PartMe
 }
 
 absl::StatusOr<OnePart> LookAtPart(int64_t index, const LoadSurface& load,
-                                   const std::vector<std::optional<Sketch>>& sketches, ThreadPool& pool) {
+                                   const std::vector<Extent>& extents, Sketches& sketches, ThreadPool& pool) {
   MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load(index));
-  const SurfaceOutline& outline = sketches[static_cast<size_t>(index)]->outline;
+  MW_ASSIGN_OR_RETURN(const std::shared_ptr<const Sketch> own, sketches.Get(index));
   std::vector<uint8_t> removed(surface->patches(), 0);
   for (int64_t other = 0; other < index; ++other) {
-    const Sketch& sketch = *sketches[static_cast<size_t>(other)];
-    if (!outline.MayOverlap(sketch.outline, kOverlapSteps)) continue;
+    const Extent& extent = extents[static_cast<size_t>(other)];
+    if (!own->outline.MayOverlap(extent.space, extent.lattice, kOverlapSteps)) continue;
+    MW_ASSIGN_OR_RETURN(const std::shared_ptr<const Sketch> sketch, sketches.Get(other));
+    if (!own->outline.MayOverlap(sketch->outline, kOverlapSteps)) continue;
     MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> cover, load(other));
-    MarkCovered(*surface, *cover, sketch.in_triangle, kOverlapSteps, pool, removed);
+    MarkCovered(*surface, *cover, sketch->in_triangle, kOverlapSteps, pool, removed);
   }
   OnePart part;
-  part.part.trimmed.assign(removed.begin(), removed.end());
   part.part.camera_index = surface->camera_index;
-  part.part.camera = surface->camera;
-  if (!surface->depth.empty()) {
-    const auto [nearest, farthest] = std::ranges::minmax_element(surface->depth);
-    part.part.nearest = *nearest;
-    part.part.farthest = *farthest;
-  }
+  part.part.space = extents[static_cast<size_t>(index)].space;
   const PartMesh mesh = BuildPartMesh(*surface, removed);
   FindBorder(*surface, mesh, part);
   part.inner = SampleInside(*surface, mesh);
+  part.trimmed = std::move(removed);
   return part;
 }
 
@@ -127,10 +139,12 @@ absl::StatusOr<OnePart> LookAtPart(int64_t index, const LoadSurface& load,
 void Append(OnePart part, PartBorders& borders) {
   const auto first_border = static_cast<int32_t>(borders.vertices.size());
   const auto first_component = static_cast<int32_t>(borders.faces_of_component.size());
+  part.part.first_patch = static_cast<int64_t>(borders.trimmed.size());
   part.part.first_border = first_border;
   part.part.first_inner = static_cast<int32_t>(borders.inner.size());
   part.part.first_component = first_component;
-  borders.parts.push_back(std::move(part.part));
+  borders.parts.push_back(part.part);
+  borders.trimmed.Append(part.trimmed);
   for (BorderVertex& vertex : part.vertices) {
     vertex.next += first_border;
     borders.vertices.push_back(vertex);
@@ -143,12 +157,38 @@ void Append(OnePart part, PartBorders& borders) {
     sample.component += first_component;
     borders.inner.push_back(sample);
   }
-  for (const auto& [v, w] : part.inner_edges) borders.inner_edges.emplace_back(first_border + v, first_border + w);
+  for (const auto& [v, w] : part.inner_edges) borders.inner_edges.push_back({first_border + v, first_border + w});
   borders.faces_of_component.insert(borders.faces_of_component.end(), part.faces_of_component.begin(),
                                     part.faces_of_component.end());
 }
 
 }  // namespace
+
+PartBorders::PartBorders(const std::string& spool_beside)
+    : spool_beside(spool_beside),
+      trimmed(spool_beside),
+      vertices(spool_beside),
+      origins(spool_beside),
+      inner(spool_beside),
+      inner_edges(spool_beside) {}
+
+size_t PartBorders::PartOf(int32_t border_vertex) const {
+  const auto behind = std::ranges::upper_bound(parts, border_vertex, {}, &Part::first_border);
+  return static_cast<size_t>(behind - parts.begin()) - 1;
+}
+
+absl::Span<const uint8_t> PartBorders::Trimmed(size_t part) const {
+  const auto first = static_cast<size_t>(parts[part].first_patch);
+  return absl::MakeConstSpan(trimmed.data() + first, static_cast<size_t>(parts[part + 1].first_patch) - first);
+}
+
+void PartBorders::Release() const {
+  trimmed.Release();
+  vertices.Release();
+  origins.Release();
+  inner.Release();
+  inner_edges.Release();
+}
 
 absl::Status ForEachPart(int64_t first, int64_t last, ThreadPool& pool,
                          const std::function<absl::Status(int64_t)>& body) {
@@ -174,28 +214,36 @@ std::vector<std::pair<int64_t, int64_t>> BatchesOfParts(const std::vector<int64_
   return batches;
 }
 
-absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& load, ThreadPool& pool,
-                                            JoinProgress& progress) {
-  std::vector<std::optional<Sketch>> sketches(static_cast<size_t>(count));
+absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& load, const std::string& spool_beside,
+                                            ThreadPool& pool, JoinProgress& progress) {
+  Sketches sketches(
+      [&](int64_t i) -> absl::StatusOr<Sketch> {
+        MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load(i));
+        return Sketch{SurfaceOutline(*surface), CornersOfTriangles(*surface)};
+      },
+      kSketchBytes);
+  std::vector<Extent> extents(static_cast<size_t>(count));
   std::vector<int64_t> patches(static_cast<size_t>(count));
   MW_RETURN_IF_ERROR(ForEachPart(0, count, pool, [&](int64_t i) -> absl::Status {
     MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load(i));
-    sketches[static_cast<size_t>(i)] = Sketch{SurfaceOutline(*surface), CornersOfTriangles(*surface)};
+    extents[static_cast<size_t>(i)] = {MeasuredSpace::Of(*surface), surface->lattice};
     patches[static_cast<size_t>(i)] = static_cast<int64_t>(surface->patches());
     progress.Step(JoinStage::kSketching, count);
     return absl::OkStatus();
   }));
-  PartBorders borders;
+  PartBorders borders(spool_beside);
   for (const auto& [first, last] : BatchesOfParts(patches)) {
     std::vector<OnePart> parts(static_cast<size_t>(last - first));
     MW_RETURN_IF_ERROR(ForEachPart(first, last, pool, [&, first = first](int64_t i) -> absl::Status {
-      MW_ASSIGN_OR_RETURN(parts[static_cast<size_t>(i - first)], LookAtPart(i, load, sketches, pool));
+      MW_ASSIGN_OR_RETURN(parts[static_cast<size_t>(i - first)], LookAtPart(i, load, extents, sketches, pool));
       progress.Step(JoinStage::kLooking, count);
       return absl::OkStatus();
     }));
     for (OnePart& part : parts) Append(std::move(part), borders);
+    borders.Release();
   }
-  borders.parts.push_back({.first_border = static_cast<int32_t>(borders.vertices.size()),
+  borders.parts.push_back({.first_patch = static_cast<int64_t>(borders.trimmed.size()),
+                           .first_border = static_cast<int32_t>(borders.vertices.size()),
                            .first_inner = static_cast<int32_t>(borders.inner.size()),
                            .first_component = static_cast<int32_t>(borders.faces_of_component.size())});
   return borders;

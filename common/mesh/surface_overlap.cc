@@ -18,6 +18,29 @@ constexpr float kMinNormalCosine = 0.5F;  // 60 degrees
 
 }  // namespace
 
+MeasuredSpace MeasuredSpace::Of(const SparseSurface& surface) {
+  MeasuredSpace space = {.camera = surface.camera};
+  if (!surface.depth.empty()) {
+    const auto [nearest, farthest] = std::ranges::minmax_element(surface.depth);
+    space.nearest = *nearest;
+    space.farthest = *farthest;
+  }
+  return space;
+}
+
+bool MeasuredSpace::MayReach(const Eigen::Vector3d& x_in_world, double radius) const {
+  const Eigen::Vector3d x = camera.CamFromWorld(x_in_world);
+  if (!(farthest > 0) || x.z() + radius < nearest || x.z() - radius > farthest) return false;
+  // Distances from the four planes through the camera's centre and the picture's sides.
+  const auto is_beyond = [&](double focal, double center_px, double size_px, double across) {
+    const double low = center_px / focal;
+    const double high = (size_px - center_px) / focal;
+    return -across - low * x.z() > radius * std::hypot(1, low) || across - high * x.z() > radius * std::hypot(1, high);
+  };
+  return !is_beyond(camera.fx, camera.cx, camera.width, x.x()) &&
+         !is_beyond(camera.fy, camera.cy, camera.height, x.y());
+}
+
 SurfaceOutline::SurfaceOutline(const SparseSurface& surface)
     : camera_(surface.camera),
       lattice_(surface.lattice),
@@ -42,6 +65,14 @@ SurfaceOutline::SurfaceOutline(const SparseSurface& surface)
       balls_.push_back(BallAround(in_tile));
       in_tile.clear();
     }
+  }
+  if (balls_.empty()) return;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  for (const Ball& ball : balls_) center += ball.center_in_world.cast<double>() / static_cast<double>(balls_.size());
+  around_all_.center_in_world = center.cast<float>();
+  for (const Ball& ball : balls_) {
+    around_all_.radius = std::max(
+        around_all_.radius, 1.01F * ((ball.center_in_world - around_all_.center_in_world).norm() + ball.radius));
   }
 }
 
@@ -80,6 +111,20 @@ bool SurfaceOutline::MayContain(const Ball& ball, double margin_steps) const {
 
 bool SurfaceOutline::MayOverlap(const SurfaceOutline& other, double margin_steps) const {
   return std::ranges::any_of(balls_, [&](const Ball& ball) { return other.MayContain(ball, margin_steps); });
+}
+
+bool SurfaceOutline::MayOverlap(const MeasuredSpace& other, const Lattice& lattice, double margin_steps) const {
+  if (balls_.empty()) return false;
+  const Eigen::Vector3d center = around_all_.center_in_world.cast<double>();
+  const double farthest = other.camera.CamFromWorld(center).z() + around_all_.radius;
+  if (!(farthest > 0)) return false;
+  const double margin = margin_steps * LevelOfDetail(other.camera, farthest, lattice.step);
+  return other.MayReach(center, around_all_.radius + margin);
+}
+
+int64_t SurfaceOutline::bytes() const {
+  return static_cast<int64_t>(sizeof(SurfaceOutline) + nearest_.size() * 2 * sizeof(float) +
+                              balls_.size() * sizeof(Ball));
 }
 
 std::vector<bool> CornersOfTriangles(const SparseSurface& surface) {

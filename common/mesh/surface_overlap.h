@@ -11,6 +11,17 @@
 
 namespace meshwright {
 
+// Where a camera may have measured anything: up to which depths (both 0: nowhere), within its picture.
+struct MeasuredSpace {
+  Camera camera = {};
+  float nearest = 0;  // depth of its patches, scene units
+  float farthest = 0;
+
+  static MeasuredSpace Of(const SparseSurface& surface);
+  // False only if no patch can lie within `radius` of x.
+  bool MayReach(const Eigen::Vector3d& x_in_world, double radius) const;
+};
+
 // Where an accepted surface lies, in tiles of its lattice: little enough to keep for all surfaces at once.
 class SurfaceOutline {
  public:
@@ -18,6 +29,10 @@ class SurfaceOutline {
 
   // False only if no patch of this surface lies within `margin_steps` lattice steps of `other` on other's rays.
   bool MayOverlap(const SurfaceOutline& other, double margin_steps) const;
+  // The same, less exactly, from where the other one was measured.
+  bool MayOverlap(const MeasuredSpace& other, const Lattice& lattice, double margin_steps) const;
+
+  int64_t bytes() const;
 
  private:
   struct Ball {  // around the patches of one tile
@@ -34,6 +49,7 @@ class SurfaceOutline {
   std::vector<float> nearest_;   // depth, per tile; 0: no patch in it
   std::vector<float> farthest_;  // depth, per tile
   std::vector<Ball> balls_;
+  Ball around_all_ = {};
 };
 
 // Per patch: it is the corner of a triangle.
