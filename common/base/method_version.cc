@@ -3,6 +3,6 @@
 
 namespace meshwright {
 
-const int kMethodVersion = 6;
+const int kMethodVersion = 7;
 
 }  // namespace meshwright

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <memory>
 #include <new>
-#include <iterator>
 #include <string>
 #include <type_traits>
 #include <utility>

@@ -35,14 +35,15 @@ constexpr double kMinSheetCosine = 0.5;
 
 double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// How far around a block, as a share of its longest side, vertices are sorted into grids; what edges further away need is
-// looked for one by one.
+// How far around a block, as a share of its longest side, vertices are sorted into grids; what edges further away need
+// is looked for one by one.
 constexpr double kMargin = 0.1;
 // Edges that one thread looks at before it takes the next ones, and triangles between two looks at how far it is.
 constexpr int64_t kEdgesAtOnce = 1024;
 constexpr size_t kPopsAStep = 4096;
-// Holes filled before memory is given back.
-constexpr size_t kHolesAtOnce = 16384;
+// What is done before memory is given back.
+constexpr size_t kHolesAtOnce = 4096;
+constexpr size_t kCornersAtOnce = 65536;
 // Of BorderStitcher::kSteps, by the time that they take.
 constexpr int kStepsOfStitching = 50;
 
@@ -132,6 +133,7 @@ BorderStitcher::BorderStitcher(absl::Span<const BorderVertex> vertices,
     At(next).previous = static_cast<int32_t>(v);
     previous_in_part_[static_cast<size_t>(next)] = static_cast<int32_t>(v);
     first_inner_edge_.push_back(static_cast<int32_t>(edge));
+    if (v % kCornersAtOnce == 0) Release();
     for (; edge < inner_edges.size() && inner_edges[edge].first == static_cast<int32_t>(v); ++edge) {
       MW_CHECK(inner_edges[edge].second > static_cast<int32_t>(v));
     }
@@ -544,6 +546,11 @@ BorderStitcher::Holes BorderStitcher::FindHoles(double max_width) const {
   SpooledVector<uint8_t> seen(spool_beside_);
   seen.assign(corners_.size(), 0);
   for (size_t i = 0; i < corners_.size(); ++i) {
+    if (i % kCornersAtOnce == 0) {
+      Release();
+      seen.Release();
+      corners.Release();
+    }
     if (!corners_[i].open || seen[i] != 0) continue;
     Hole loop = {.first = corners.size()};
     Eigen::Vector3d center = Eigen::Vector3d::Zero();
@@ -701,7 +708,10 @@ int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>&
     }
     Advance(corners, scope, candidates, [](double) {});
     if (corners.size() == rim.size()) CloseLoops(corners);  // it has no islands
-    if (h % kHolesAtOnce == 0) Release();
+    if (h % kHolesAtOnce == 0) {
+      Release();
+      found.corners.Release();
+    }
   }
   filling.Reach(1);
   std::vector<uint8_t> is_filled(found.holes.size(), 1);

@@ -41,8 +41,9 @@ class BorderStitcher {
   // Number of a face that is none.
   static constexpr int32_t kNone = -1;
 
-  // `inner_edges`: pairs (v, w) of border vertices, v < w, ascending by v, that an edge joins which has its two triangles
-  // already. Vertices and edges must outlive the stitcher. What it needs is spooled beside `spool_beside` (SpooledBytes).
+  // `inner_edges`: pairs (v, w) of border vertices, v < w, ascending by v, that an edge joins which has its two
+  // triangles already. Vertices and edges must outlive the stitcher. What it needs is spooled beside `spool_beside`
+  // (SpooledBytes).
   BorderStitcher(absl::Span<const BorderVertex> vertices, absl::Span<const std::pair<int32_t, int32_t>> inner_edges,
                  const std::string& spool_beside = {});
 
@@ -75,6 +76,8 @@ class BorderStitcher {
   int64_t CountOpenEdges() const;
   // Where the part's border comes to the vertex from.
   int32_t PreviousInPart(int32_t v) const { return previous_in_part_[static_cast<size_t>(v)]; }
+  // Gives memory back until it is asked for again.
+  void Release() const;
   // Vertices that several gaps meet, ascending, with how many.
   std::vector<int32_t> VerticesWithSeveralGaps() const;
 
@@ -154,8 +157,6 @@ class BorderStitcher {
   void FindNearby(const Eigen::Vector3d& x, double radius, std::vector<int32_t>& found);
   void StitchBlock(const PointBlocks::Block& block, const Scope& scope, ThreadPool& pool, const Progress& looking,
                    const Progress& stitching);
-  // Gives memory back.
-  void Release() const;
   Holes FindHoles(double max_width) const;
   std::vector<int32_t> CutSimpleLoop(int32_t first);
   void CloseLoops(absl::Span<const int32_t> corners);

@@ -18,7 +18,8 @@ namespace meshwright {
 struct PartJoins {
   const uint8_t* small = nullptr;  // per component of the part: to be left out
   std::vector<SeamOffset> offsets = {};
-  std::vector<std::pair<uint32_t, uint32_t>> edges = {};  // (from, to) of stitches and fillings between its own vertices
+  std::vector<std::pair<uint32_t, uint32_t>> edges =
+      {};  // (from, to) of stitches and fillings between its own vertices
 };
 
 // One part, ready to be written.
@@ -29,9 +30,9 @@ struct FinishedPart {
   double area = 0;  // scene units squared
 };
 
-// The part, whose patches `trimmed` leaves out, without its small components; colours run into those of its neighbours over `blend_steps`, faces are
-// simplified to an error of `simplify_footprints` times the median pixel footprint of its vertices (0: not at all).
-// Vertices on the border stay.
+// The part, whose patches `trimmed` leaves out, without its small components; colours run into those of its neighbours
+// over `blend_steps`, faces are simplified to an error of `simplify_footprints` times the median pixel footprint of its
+// vertices (0: not at all). Vertices on the border stay.
 FinishedPart FinishPart(const SparseSurface& surface, absl::Span<const uint8_t> trimmed, const PartJoins& joins,
                         int blend_steps, double simplify_footprints);
 

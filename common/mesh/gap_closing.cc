@@ -41,14 +41,14 @@ struct ClosingPoint {
   int32_t part = 0;
 };
 
-SpooledVector<ClosingPoint> CollectPoints(const PartBorders& borders, const std::function<bool(int32_t)>& is_open,
-                                          const std::vector<uint8_t>& is_small, const std::string& spool_beside) {
-  SpooledVector<ClosingPoint> points(spool_beside);
+SpooledVector<ClosingPoint> CollectPoints(const PartBorders& borders, const BorderStitcher& stitcher,
+                                          const std::vector<uint8_t>& is_small) {
+  SpooledVector<ClosingPoint> points(borders.spool_beside);
   for (size_t part = 0; part + 1 < borders.parts.size(); ++part) {
     const PartBorders::Part& from = borders.parts[part];
     const PartBorders::Part& to = borders.parts[part + 1];
     for (int32_t v = from.first_border; v < to.first_border; ++v) {
-      if (!is_open(v)) continue;
+      if (!stitcher.IsOpen(v)) continue;
       const BorderVertex& vertex = borders.vertices[static_cast<size_t>(v)];
       points.push_back({{vertex.position.cast<double>(), vertex.spacing}, v, static_cast<int32_t>(part)});
     }
@@ -57,6 +57,9 @@ SpooledVector<ClosingPoint> CollectPoints(const PartBorders& borders, const std:
       if (is_small[static_cast<size_t>(sample.component)] != 0) continue;
       points.push_back({{sample.position.cast<double>(), sample.spacing}, -1, static_cast<int32_t>(part)});
     }
+    borders.Release();
+    stitcher.Release();
+    points.Release();
   }
   return points;
 }
@@ -80,7 +83,8 @@ class BlockCloser {
     std::ranges::sort(around, {}, [&](int32_t i) { return std::pair(At(i).measured.x_in_world.x(), i); });
     std::vector<int64_t> seen_by;
     for (size_t part = 0; part < is_first_.size(); ++part) {
-      if (borders_.parts[part].space.MayReach(box.center(), 0.5 * box.diagonal().norm())) seen_by.push_back(static_cast<int64_t>(part));
+      if (borders_.parts[part].space.MayReach(box.center(), 0.5 * box.diagonal().norm()))
+        seen_by.push_back(static_cast<int64_t>(part));
     }
     MW_ASSIGN_OR_RETURN(const Triangles cut, Cut(around, seen_by));
     std::vector<Candidate> candidates;
@@ -188,14 +192,15 @@ class BlockCloser {
 }  // namespace
 
 absl::StatusOr<std::vector<BorderStitcher::Face>> FindGapTriangles(const PartBorders& borders,
-                                                                   const std::function<bool(int32_t)>& is_open,
+                                                                   const BorderStitcher& stitcher,
                                                                    const std::vector<uint8_t>& is_small, double reach,
                                                                    const LoadSurface& load, ThreadPool& pool,
                                                                    JoinProgress& progress) {
-  const SpooledVector<ClosingPoint> points = CollectPoints(borders, is_open, is_small, borders.spool_beside);
+  const SpooledVector<ClosingPoint> points = CollectPoints(borders, stitcher, is_small);
   const PointBlocks blocks(
       static_cast<int32_t>(points.size()),
-      [&](int32_t i) { return points[static_cast<size_t>(i)].measured.x_in_world; }, kPointsOfBlock, borders.spool_beside);
+      [&](int32_t i) { return points[static_cast<size_t>(i)].measured.x_in_world; }, kPointsOfBlock,
+      borders.spool_beside);
   const BlockCloser closer(borders, points, blocks, reach, load);
   const auto count = static_cast<int64_t>(blocks.blocks().size());
   std::vector<std::vector<BorderStitcher::Face>> of_block(blocks.blocks().size());

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include <absl/status/statusor.h>
@@ -19,11 +18,11 @@ namespace meshwright {
 // and few rays pass through it (GapWitness, SurfaceWitness). `reach`: how large gaps may be, as a share of a
 // photograph's longer side.
 //
-// `is_open`, per border vertex: it may take triangles. `is_small`, per component: it has been left out. Works in blocks
-// of vertices, one a thread, with the surfaces that see a block loaded one after the other, and spools what grows with
-// the mesh. Depends on the surfaces and their order alone. Errors: those of `load`.
+// `stitcher` knows which border vertices may take triangles. `is_small`, per component: it has been left out. Works in
+// blocks of vertices, one a thread, with the surfaces that see a block loaded one after the other, and spools what
+// grows with the mesh. Depends on the surfaces and their order alone. Errors: those of `load`.
 absl::StatusOr<std::vector<BorderStitcher::Face>> FindGapTriangles(const PartBorders& borders,
-                                                                   const std::function<bool(int32_t)>& is_open,
+                                                                   const BorderStitcher& stitcher,
                                                                    const std::vector<uint8_t>& is_small, double reach,
                                                                    const LoadSurface& load, ThreadPool& pool,
                                                                    JoinProgress& progress);

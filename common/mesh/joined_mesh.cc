@@ -33,6 +33,7 @@ PlyAttributes AttributesWith(const Eigen::Vector3d& offset) {
 constexpr double kStitchReach = 2;
 // Offsets at a seam are averaged over this many vertices to either side, so that texture does not smear.
 constexpr int kSeamSmoothing = 8;
+// What is done before memory is given back.
 constexpr size_t kFacesAtOnce = 65536;
 
 // Per component of a part: whether what it is joined to edge by edge has too few faces. A lone triangle always has.
@@ -44,6 +45,11 @@ std::vector<uint8_t> SmallComponents(const PartBorders& borders, const BorderSti
   SpooledVector<int32_t> component_of_face(borders.spool_beside);
   const absl::Span<const BorderStitcher::Face> faces = stitcher.faces();
   for (size_t f = 0; f < faces.size(); ++f) {
+    if (f % kFacesAtOnce == 0) {
+      borders.Release();
+      stitcher.Release();
+      component_of_face.Release();
+    }
     int32_t component = -1;
     for (size_t k = 0; k < 3; ++k) {
       const int32_t from = faces[f][k];
@@ -90,7 +96,12 @@ SpooledVector<SeamDifference> SeamDifferences(const PartBorders& borders,
                                               absl::Span<const BorderStitcher::Face> stitches) {
   SpooledVector<SeamDifference> differences(borders.spool_beside);
   differences.assign(borders.origins.size(), {});
-  for (const BorderStitcher::Face& face : stitches) {
+  for (size_t f = 0; f < stitches.size(); ++f) {
+    if (f % kFacesAtOnce == 0) {
+      borders.Release();
+      differences.Release();
+    }
+    const BorderStitcher::Face& face = stitches[f];
     std::array<size_t, 3> parts = {};
     std::ranges::transform(face, parts.begin(), [&](int32_t v) { return borders.PartOf(v); });
     for (size_t i = 0; i < 3; ++i) {
@@ -139,8 +150,8 @@ std::vector<SeamOffset> SeamOffsets(const PartBorders& borders, const SpooledVec
 }
 
 // A vertex at which several gaps meet would join fans of triangles in a point only. Each fan but the one that lies in
-// its part gets a copy of the vertex in `faces`, which are the stitcher's, numbered behind its vertices. Returns what is
-// copied.
+// its part gets a copy of the vertex in `faces`, which are the stitcher's, numbered behind its vertices. Returns what
+// is copied.
 std::vector<int32_t> SplitPoints(const BorderStitcher& stitcher, SpooledVector<BorderStitcher::Face>& faces) {
   std::vector<int32_t> copies;
   for (const int32_t point : stitcher.VerticesWithSeveralGaps()) {
@@ -224,6 +235,7 @@ int64_t SewOn(absl::Span<const BorderStitcher::Face> triangles, const JoinOption
   int64_t sewn = 0;
   for (; !triangles.empty(); triangles.remove_prefix(std::min(at_once, triangles.size()))) {
     sewn += stitcher.SewOn(triangles.subspan(0, at_once));
+    stitcher.Release();
   }
   return sewn;
 }
@@ -237,7 +249,10 @@ BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, 
       static_cast<int32_t>(borders.vertices.size()),
       [&](int32_t v) { return borders.vertices[static_cast<size_t>(v)].position.cast<double>(); },
       static_cast<size_t>(options.vertices_of_block), borders.spool_beside);
-  std::function<void()> step = [&] { progress.Step(JoinStage::kStitching, BorderStitcher::kSteps); };
+  std::function<void()> step = [&] {
+    progress.Step(JoinStage::kStitching, BorderStitcher::kSteps);
+    borders.Release();
+  };
   SpooledVector<BorderStitcher::Face> stays(borders.spool_beside);
   while (true) {
     BorderStitcher stitcher(absl::MakeConstSpan(borders.vertices.data(), borders.vertices.size()),
@@ -250,7 +265,7 @@ BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, 
     });
     SewOn(absl::MakeConstSpan(stays.data(), stays.size()), options, stitcher);
     stitcher.StitchNearby(kStitchReach, blocks, pool, step);
-    step = [] {};
+    step = [&] { borders.Release(); };
     int64_t removed = 0;
     std::vector<uint8_t> now_small = SmallComponents(borders, stitcher, options.min_component_faces, removed);
     if (now_small == small) {
@@ -266,6 +281,7 @@ BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, 
       if (std::ranges::none_of(face, is_small)) stays.push_back(face);
     }
     borders.Release();
+    stays.Release();
   }
 }
 
@@ -274,13 +290,14 @@ absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions&
   Joins joins(borders.spool_beside);
   BorderStitcher stitcher = Stitched(borders, options, pool, progress, joins.small, counts);
   const size_t stitch_faces = stitcher.faces().size();
-  const auto step = [&] { progress.Step(JoinStage::kStitching, BorderStitcher::kSteps); };
+  const auto step = [&] {
+    progress.Step(JoinStage::kStitching, BorderStitcher::kSteps);
+    borders.Release();
+  };
   counts.holes_filled = stitcher.FillHoles(options.max_hole_steps, step);
   if (options.close_reach > 0) {
     MW_ASSIGN_OR_RETURN(const std::vector<BorderStitcher::Face> triangles,
-                        FindGapTriangles(
-                            borders, [&](int32_t v) { return stitcher.IsOpen(v); }, joins.small, options.close_reach,
-                            load, pool, progress));
+                        FindGapTriangles(borders, stitcher, joins.small, options.close_reach, load, pool, progress));
     counts.closing_faces = SewOn(triangles, options, stitcher);
     // What it has left open is small now.
     counts.holes_filled += stitcher.FillHoles(options.max_hole_steps, [] {});
@@ -290,10 +307,16 @@ absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions&
   counts.hole_faces = static_cast<int64_t>(stitcher.faces().size() - stitch_faces) - counts.closing_faces;
   joins.differences = SeamDifferences(borders, stitcher.faces().subspan(0, stitch_faces));
   const auto position = [&](int32_t v) { return stitcher.vertices()[static_cast<size_t>(v)].position; };
-  for (const auto& face : stitcher.faces()) {
+  for (size_t f = 0; f < stitcher.faces().size(); ++f) {
+    const BorderStitcher::Face& face = stitcher.faces()[f];
     counts.area += TriangleArea(position(face[0]), position(face[1]), position(face[2]));
+    joins.faces.push_back(face);
+    if (f % kFacesAtOnce == 0) {
+      borders.Release();
+      stitcher.Release();
+      joins.Release();
+    }
   }
-  joins.faces.Append(stitcher.faces());
   joins.copies = SplitPoints(stitcher, joins.faces);
   if (options.simplify_footprints > 0) CollectEdges(borders, joins);
   return joins;
@@ -306,8 +329,7 @@ PartJoins JoinsOfPart(const PartBorders& borders, const Joins& joins, size_t ind
   PartJoins of_part = {.small = joins.small.data() + part.first_component,
                        .offsets = SeamOffsets(borders, joins.differences, index)};
   const auto vertex = [&](int32_t v) { return static_cast<uint32_t>(borders.origins[static_cast<size_t>(v)].vertex); };
-  const auto* edge =
-      std::lower_bound(joins.edges.begin(), joins.edges.end(), std::pair(part.first_border, int32_t{0}));
+  const auto* edge = std::lower_bound(joins.edges.begin(), joins.edges.end(), std::pair(part.first_border, int32_t{0}));
   for (; edge != joins.edges.end() && edge->first < end; ++edge) {
     of_part.edges.emplace_back(vertex(edge->first), vertex(edge->second));
   }
@@ -318,10 +340,7 @@ PartJoins JoinsOfPart(const PartBorders& borders, const Joins& joins, size_t ind
 class PartWriter {
  public:
   PartWriter(const PartBorders& borders, const Joins& joins, PlyStreamWriter& writer)
-      : borders_(borders),
-        joins_(joins),
-        writer_(writer),
-        index_of_border_(borders.spool_beside) {
+      : borders_(borders), joins_(joins), writer_(writer), index_of_border_(borders.spool_beside) {
     index_of_border_.assign(borders.origins.size() + joins.copies.size(), 0);
   }
 
@@ -355,6 +374,8 @@ class PartWriter {
       if (faces.size() < kFacesAtOnce && f + 1 < joins_.faces.size()) continue;
       MW_RETURN_IF_ERROR(writer_.AppendFaces(faces));
       faces.clear();
+      Release();
+      joins_.Release();
     }
     return absl::OkStatus();
   }

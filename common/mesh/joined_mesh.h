@@ -28,7 +28,7 @@ struct JoinOptions {
   // the part's vertices, 0 .. 100; 0: none are left out.
   double simplify_footprints = 0;
   // Border vertices that are stitched at a time: what that takes of memory is some 100 bytes each. > 0.
-  int64_t vertices_of_block = 500'000;
+  int64_t vertices_of_block = 250'000;
 
   absl::Status Validate() const;
 };
@@ -57,8 +57,8 @@ struct JoinedMeshCounts {
 //
 // Loads each surface a few times, a few of them at a time. Borders of all of them are spooled in nameless files beside
 // `path` (some 150 bytes for each of their vertices, and 1 byte for each patch) and worked on in blocks of neighbours,
-// so that memory does not grow with them; where there is no room for such files they stay in memory. Errors: those of `load` or of PlyStreamWriter, InvalidArgument for options;
-// then no file appears.
+// so that memory does not grow with them; where there is no room for such files they stay in memory. Errors: those of
+// `load` or of PlyStreamWriter, InvalidArgument for options; then no file appears.
 absl::StatusOr<JoinedMeshCounts> WriteJoinedMesh(
     int64_t count, const LoadSurface& load, const JoinOptions& options, const Eigen::Vector3d& offset,
     const std::string& path, ThreadPool& pool, const JoinListener& listener = [](double) {});

@@ -112,8 +112,8 @@ std::vector<InnerSample> SampleInside(const SparseSurface& surface, const PartMe
   return samples;
 }
 
-absl::StatusOr<OnePart> LookAtPart(int64_t index, const LoadSurface& load,
-                                   const std::vector<Extent>& extents, Sketches& sketches, ThreadPool& pool) {
+absl::StatusOr<OnePart> LookAtPart(int64_t index, const LoadSurface& load, const std::vector<Extent>& extents,
+                                   Sketches& sketches, ThreadPool& pool) {
   MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SparseSurface> surface, load(index));
   MW_ASSIGN_OR_RETURN(const std::shared_ptr<const Sketch> own, sketches.Get(index));
   std::vector<uint8_t> removed(surface->patches(), 0);

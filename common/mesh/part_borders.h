@@ -40,8 +40,8 @@ struct InnerSample {
   int32_t component = 0;     // of all parts
 };
 
-// What is kept of every part while all are joined: where it is trimmed, its border, and what lies inside in outline. What
-// grows with the mesh is spooled.
+// What is kept of every part while all are joined: where it is trimmed, its border, and what lies inside in outline.
+// What grows with the mesh is spooled.
 struct PartBorders {
   struct Part {
     int64_t first_patch = 0;      // of `trimmed`
@@ -59,7 +59,7 @@ struct PartBorders {
   void Release() const;
 
   std::string spool_beside;
-  std::vector<Part> parts;  // and one more, which holds the ends
+  std::vector<Part> parts;         // and one more, which holds the ends
   SpooledVector<uint8_t> trimmed;  // per patch
   SpooledVector<BorderVertex> vertices;
   SpooledVector<BorderOrigin> origins;
@@ -68,8 +68,8 @@ struct PartBorders {
   std::vector<int64_t> faces_of_component;
 };
 
-// Trims accepted surfaces 0 .. count - 1 where an earlier one shows the same and finds the borders of what is left, which
-// are spooled beside `spool_beside` (SpooledBytes). Errors: those of `load`.
+// Trims accepted surfaces 0 .. count - 1 where an earlier one shows the same and finds the borders of what is left,
+// which are spooled beside `spool_beside` (SpooledBytes). Errors: those of `load`.
 absl::StatusOr<PartBorders> FindPartBorders(int64_t count, const LoadSurface& load, const std::string& spool_beside,
                                             ThreadPool& pool, JoinProgress& progress);
 

@@ -28,9 +28,8 @@ void PointBlocks::Split(Block block, size_t most) {
     Eigen::Index axis = 0;
     block.around_points.sizes().maxCoeff(&axis);
     int32_t* const middle = first + (last - first) / 2;
-    std::nth_element(first, middle, last, [&](int32_t i, int32_t j) {
-      return std::pair(at_(i)[axis], i) < std::pair(at_(j)[axis], j);
-    });
+    std::nth_element(first, middle, last,
+                     [&](int32_t i, int32_t j) { return std::pair(at_(i)[axis], i) < std::pair(at_(j)[axis], j); });
     const double border = at_(*middle)[axis];
     const int32_t* const split = std::partition(first, last, [&](int32_t i) { return at_(i)[axis] < border; });
     if (split != first) {

@@ -18,7 +18,8 @@ TEST(PointBlocks, EachPointIsInOneBlockAndFoundWhereItLies) {
   // Some lie on each other, so that no plane parts them.
   for (int i = 0; i < 200; ++i) points.emplace_back(1, 0.5, 0);
   const auto count = static_cast<int32_t>(points.size());
-  const PointBlocks blocks(count, [&](int32_t i) { return points[static_cast<size_t>(i)]; }, 100, "");
+  const PointBlocks blocks(
+      count, [&](int32_t i) { return points[static_cast<size_t>(i)]; }, 100, "");
   std::vector<int> times(points.size(), 0);
   size_t large = 0;
   for (const PointBlocks::Block& block : blocks.blocks()) {

@@ -71,8 +71,8 @@ SurfaceOutline::SurfaceOutline(const SparseSurface& surface)
   for (const Ball& ball : balls_) center += ball.center_in_world.cast<double>() / static_cast<double>(balls_.size());
   around_all_.center_in_world = center.cast<float>();
   for (const Ball& ball : balls_) {
-    around_all_.radius = std::max(
-        around_all_.radius, 1.01F * ((ball.center_in_world - around_all_.center_in_world).norm() + ball.radius));
+    around_all_.radius = std::max(around_all_.radius,
+                                  1.01F * ((ball.center_in_world - around_all_.center_in_world).norm() + ball.radius));
   }
 }
 
