@@ -19,6 +19,7 @@
 #include "common/mesh/disjoint_sets.h"
 #include "common/mesh/finished_part.h"
 #include "common/mesh/gap_closing.h"
+#include "common/mesh/part_borders.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/point_blocks.h"
 #include "common/mesh/seam_blending.h"

@@ -10,7 +10,7 @@
 
 #include "common/base/thread_pool.h"
 #include "common/mesh/join_progress.h"
-#include "common/mesh/part_borders.h"
+#include "common/mesh/load_surface.h"
 
 namespace meshwright {
 

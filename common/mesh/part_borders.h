@@ -17,14 +17,11 @@
 #include "common/base/thread_pool.h"
 #include "common/mesh/border_stitching.h"
 #include "common/mesh/join_progress.h"
+#include "common/mesh/load_surface.h"
 #include "common/mesh/surface_overlap.h"
 #include "common/surface/sparse_surface.h"
 
 namespace meshwright {
-
-// Gives surface `index` of those that make up the mesh; each is asked for several times. Called by several threads at
-// the same time.
-using LoadSurface = std::function<absl::StatusOr<std::shared_ptr<const SparseSurface>>(int64_t index)>;
 
 struct BorderOrigin {
   int32_t vertex = 0;     // of its part

@@ -12,6 +12,8 @@
 #include "pipeline/options/option_testing.h"
 #include "pipeline/options/options_json.h"
 
+#include "common/base/method_version.h"
+
 namespace meshwright {
 namespace {
 
@@ -129,7 +131,8 @@ TEST(ParseOptionsTest, TextsThatAreNoOptionsAreRefused) {
   EXPECT_THAT(Refusal("[]"), HasSubstr("a JSON object expected"));
   EXPECT_THAT(Refusal("{"), HasSubstr("the text is not valid JSON"));
   EXPECT_THAT(Refusal(R"({"version": "7"})"), HasSubstr("version is \"7\""));
-  for (const char* const method : {"7", "0", "\"1\"", "1.5", "[]"}) {
+  for (const std::string& method : {absl::StrCat(kMethodVersion + 1), std::string("0"), std::string("\"1\""),
+                                    std::string("1.5"), std::string("[]")}) {
     EXPECT_THAT(Refusal(absl::StrCat("{\"method\": ", method, "}")), HasSubstr(absl::StrCat("method is ", method)));
   }
   EXPECT_THAT(Refusal(R"({"window": 99999999999999999999})"), HasSubstr("expected a whole number from 1 to"));
