@@ -56,10 +56,17 @@ void WallWorld::Write(const std::string& folder) const {
   MW_CHECK(ExportColmapText(scene, folder + "/model").ok());
 
   fs::create_directories(folder + "/images");
-  const std::string picture = folder + "/images/" + scene.views[0].name;
-  MW_CHECK(WritePng(picture, {kWidth, kHeight, std::vector<uint8_t>(3 * kWidth * kHeight, 128)}).ok());
-  for (size_t i = 1; i < scene.views.size(); ++i) {
-    fs::create_hard_link(picture, folder + "/images/" + scene.views[i].name);
+  // A file has 65,000 names at most.
+  constexpr size_t kMostLinks = 50'000;
+  std::string picture;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    const std::string name = folder + "/images/" + scene.views[i].name;
+    if (i % kMostLinks == 0) {
+      picture = name;
+      MW_CHECK(WritePng(picture, {kWidth, kHeight, std::vector<uint8_t>(3 * kWidth * kHeight, 128)}).ok());
+    } else {
+      fs::create_hard_link(picture, name);
+    }
   }
 }
 
