@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/base/spooled_vector.h"
 
-#include <cstdlib>
 #include <cstring>
 
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <unistd.h>
+
+#include "common/base/nameless_file.h"
 
 namespace meshwright {
 namespace {
@@ -38,10 +39,9 @@ SpooledBytes::~SpooledBytes() {
 bool SpooledBytes::GrowFile(size_t bytes) {
   if (descriptor_ < 0) {
     if (beside_.empty() || data_ != nullptr) return false;
-    std::string name = beside_ + ".spool-XXXXXX";
-    descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
-    if (descriptor_ < 0) return false;
-    ::unlink(name.c_str());  // its space goes back when the descriptor closes, however the process ends
+    const absl::StatusOr<int> created = CreateNamelessFile(beside_);
+    if (!created.ok()) return false;
+    descriptor_ = *created;
   }
   // A page without a block behind it would end the process when the disk is full.
   if (::posix_fallocate(descriptor_, 0, static_cast<off_t>(bytes)) != 0) return false;

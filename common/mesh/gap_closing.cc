@@ -83,8 +83,8 @@ class BlockCloser {
     std::ranges::sort(around, {}, [&](int32_t i) { return std::pair(At(i).measured.x_in_world.x(), i); });
     std::vector<int64_t> seen_by;
     for (size_t part = 0; part < is_first_.size(); ++part) {
-      if (borders_.parts[part].space.MayReach(box.center(), 0.5 * box.diagonal().norm()))
-        seen_by.push_back(static_cast<int64_t>(part));
+      const MeasuredSpace& space = borders_.parts[part].space;
+      if (space.MayReach(box.center(), 0.5 * box.diagonal().norm())) seen_by.push_back(static_cast<int64_t>(part));
     }
     MW_ASSIGN_OR_RETURN(const Triangles cut, Cut(around, seen_by));
     std::vector<Candidate> candidates;

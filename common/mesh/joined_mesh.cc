@@ -243,17 +243,16 @@ int64_t SewOn(absl::Span<const BorderStitcher::Face> triangles, const JoinOption
 
 // Stitches all but the components that are small, and finds which are. Triangles to crumbs keep others from meeting:
 // these are taken away with them, and what they leave open is stitched again, until all that is left is large.
+// Tells `first_step` how far the first round is.
 BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, ThreadPool& pool,
-                        JoinProgress& progress, std::vector<uint8_t>& small, JoinedMeshCounts& counts) {
+                        const std::function<void()>& first_step, std::vector<uint8_t>& small,
+                        JoinedMeshCounts& counts) {
   small.assign(borders.faces_of_component.size(), 0);
   const PointBlocks blocks(
       static_cast<int32_t>(borders.vertices.size()),
       [&](int32_t v) { return borders.vertices[static_cast<size_t>(v)].position.cast<double>(); },
       static_cast<size_t>(options.vertices_of_block), borders.spool_beside);
-  std::function<void()> step = [&] {
-    progress.Step(JoinStage::kStitching, BorderStitcher::kSteps);
-    borders.Release();
-  };
+  std::function<void()> step = first_step;
   SpooledVector<BorderStitcher::Face> stays(borders.spool_beside);
   while (true) {
     BorderStitcher stitcher(absl::MakeConstSpan(borders.vertices.data(), borders.vertices.size()),
@@ -289,12 +288,12 @@ BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, 
 absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions& options, const LoadSurface& load,
                                   ThreadPool& pool, JoinProgress& progress, JoinedMeshCounts& counts) {
   Joins joins(borders.spool_beside);
-  BorderStitcher stitcher = Stitched(borders, options, pool, progress, joins.small, counts);
-  const size_t stitch_faces = stitcher.faces().size();
   const auto step = [&] {
     progress.Step(JoinStage::kStitching, BorderStitcher::kSteps);
     borders.Release();
   };
+  BorderStitcher stitcher = Stitched(borders, options, pool, step, joins.small, counts);
+  const size_t stitch_faces = stitcher.faces().size();
   counts.holes_filled = stitcher.FillHoles(options.max_hole_steps, step);
   if (options.close_reach > 0) {
     MW_ASSIGN_OR_RETURN(const std::vector<BorderStitcher::Face> triangles,

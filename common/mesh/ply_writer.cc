@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <string>
 #include <utility>
@@ -12,12 +11,12 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/str_cat.h>
 #include <absl/types/span.h>
-#include <fcntl.h>
 #include <unistd.h>
 
 #include "common/base/check.h"
 #include "common/base/files.h"
 #include "common/base/little_endian.h"
+#include "common/base/nameless_file.h"
 #include "common/base/status_macros.h"
 #include "common/mesh/ply.h"
 #include "common/mesh/ply_header.h"
@@ -101,18 +100,11 @@ absl::Status CheckVertexCount(uint64_t vertices, const std::string& path) {
       absl::StrCat(path, ": ", vertices, " vertices, expected at most ", kMost, ", which PLY indices can tell apart"));
 }
 
-absl::Status TemporaryError(const std::string& what, const std::string& path, int error) {
-  const std::string message =
-      absl::StrCat(path, ": cannot ", what, " a temporary file beside it: ", std::strerror(error));
-  if (error == ENOSPC || error == EDQUOT) return absl::ResourceExhaustedError(message);
-  return absl::InternalError(message);
-}
-
 absl::Status WriteToTemporary(int descriptor, absl::Span<const uint8_t> bytes, const std::string& path) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return TemporaryError("write", path, errno);
+    if (written < 0) return NamelessFileError("write", path, errno);
     bytes.remove_prefix(static_cast<size_t>(written));
   }
   return absl::OkStatus();
@@ -153,10 +145,7 @@ PlyStreamWriter::~PlyStreamWriter() {
 
 absl::StatusOr<PlyStreamWriter> PlyStreamWriter::Create(const std::string& path, const PlyAttributes& attributes) {
   MW_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
-  std::string temporary = path + ".faces-XXXXXX";
-  const int descriptor = ::mkostemp(temporary.data(), O_CLOEXEC);
-  if (descriptor < 0) return TemporaryError("create", path, errno);
-  ::unlink(temporary.c_str());  // its space goes back when the descriptor closes, however the process ends
+  MW_ASSIGN_OR_RETURN(const int descriptor, CreateNamelessFile(path));
   PlyStreamWriter writer(path, attributes, std::move(file), descriptor);
   MW_RETURN_IF_ERROR(writer.file_.Append(ply::FormatHeader(attributes, 0, 0)));
   return writer;
@@ -184,13 +173,13 @@ absl::Status PlyStreamWriter::AppendFaces(absl::Span<const std::array<uint32_t, 
 }
 
 absl::Status PlyStreamWriter::Commit() {
-  if (::lseek(faces_descriptor_, 0, SEEK_SET) < 0) return TemporaryError("read", path_, errno);
+  if (::lseek(faces_descriptor_, 0, SEEK_SET) < 0) return NamelessFileError("read", path_, errno);
   std::vector<uint8_t> buffer(kCopyBytes);
   int64_t copied = 0;
   while (true) {
     const ssize_t count = ::read(faces_descriptor_, buffer.data(), buffer.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return TemporaryError("read", path_, errno);
+    if (count < 0) return NamelessFileError("read", path_, errno);
     if (count == 0) break;
     MW_RETURN_IF_ERROR(file_.Append(absl::MakeConstSpan(buffer.data(), static_cast<size_t>(count))));
     copied += count;
