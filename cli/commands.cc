@@ -11,10 +11,23 @@
 #include "pipeline/cameras/photograph_folder.h"
 
 #include "common/base/bad_input.h"
+#include "common/base/files.h"
+#include "common/base/status_macros.h"
+#include "common/job/camera_refinement.h"
 #include "common/scene/formats/formats.h"
 #include "common/scene/formats/import.h"
 
 namespace meshwright {
+
+namespace {
+
+absl::Status ApplyRefinementFrom(const std::string& path, Scene& scene) {
+  MW_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  MW_ASSIGN_OR_RETURN(const CameraRefinement refinement, DecodeCameraRefinement(text));
+  return ApplyRefinement(refinement, scene);
+}
+
+}  // namespace
 
 void AddSceneOptions(CLI::App& command, SceneArguments& scene) {
   std::vector<std::string> names;
@@ -40,6 +53,10 @@ void AddSceneOptions(CLI::App& command, SceneArguments& scene) {
                   "a box (JSON) outside of which nothing is reconstructed; \"auto\": around the sparse points; "
                   "\"none\"; without it region.json of the scene")
       ->type_name("FILE|auto|none");
+  command
+      .add_option("--refined-cameras", scene.refined_cameras,
+                  "the cameras that reconstruct refined (MESH.cameras.json), in the place of the scene's")
+      ->type_name("FILE");
   command.add_flag("--rescale-cameras", scene.import.rescale_cameras,
                    "cameras follow photographs that are larger or smaller than they say, by a common factor");
   command
@@ -80,6 +97,11 @@ absl::StatusOr<Scene> LoadScene(const SceneArguments& arguments) {
   absl::StatusOr<Scene> scene = ImportScene(arguments.path, arguments.import);
   if (!scene.ok()) return BadInput(scene.status());
   for (const std::string& warning : scene->warnings) Warn(warning);
+  if (!arguments.refined_cameras.empty()) {
+    if (const absl::Status refined = ApplyRefinementFrom(arguments.refined_cameras, *scene); !refined.ok()) {
+      return BadInput(absl::Status(refined.code(), absl::StrCat(arguments.refined_cameras, ": ", refined.message())));
+    }
+  }
   return scene;
 }
 

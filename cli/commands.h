@@ -42,6 +42,7 @@ void AddTokenCommand(CLI::App& program, Run& run);
 struct SceneArguments {
   std::string path;
   ImportOptions import;
+  std::string refined_cameras;  // a file that reconstruct left of this scene; "": the scene's own cameras
 };
 // --format, --model, --images, --masks, --region and what else says how a scene is read.
 void AddSceneOptions(CLI::App& command, SceneArguments& scene);

@@ -68,6 +68,9 @@ void PrintSummary(const nlohmann::ordered_json& report, const LocalSettings& set
               FormatCount(report["mesh"]["faces"].get<int64_t>()).c_str());
   std::printf("report   %s\n", settings.report_path.c_str());
   if (!settings.page_path.empty()) std::printf("page     %s\n", settings.page_path.c_str());
+  if (report["scene"]["refinement"]["moved"].get<bool>()) {
+    std::printf("refined  %s: for other commands, --refined-cameras\n", settings.cameras_path.c_str());
+  }
   std::printf("cameras  %d processed\n", totals["cameras_processed"].get<int>());
   std::printf("rays     %s\n",
               DescribeShares(totals["share_covered_before"].get<double>(), totals["share_grown"].get<double>(),
@@ -116,6 +119,7 @@ int Reconstruct(Arguments& arguments) {
     settings.texture->compressed = settings.write.compressed;
   }
   settings.report_path = BesideOutput(settings.output_path, ".report.json");
+  settings.cameras_path = BesideOutput(settings.output_path, ".cameras.json");
   if (settings.work_folder.empty()) settings.work_folder = settings.output_path + ".work";
   if (arguments.parts) settings.parts_folder = BesideOutput(settings.output_path, ".parts");
   const int64_t mebibytes = arguments.memory_mib > 0 ? arguments.memory_mib : DefaultMemoryMib(settings.threads);

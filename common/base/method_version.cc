@@ -3,6 +3,6 @@
 
 namespace meshwright {
 
-const int kMethodVersion = 7;
+const int kMethodVersion = 8;
 
 }  // namespace meshwright

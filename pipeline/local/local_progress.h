@@ -6,13 +6,14 @@
 
 namespace meshwright {
 
-enum class LocalStage { kChecking, kPairs, kCameras, kJudging, kJoining, kTexturing, kReporting };
+enum class LocalStage { kChecking, kRefining, kPairs, kCameras, kJudging, kJoining, kTexturing, kReporting };
 std::string NameOf(LocalStage stage);
 
 // What a progress display can show.
 struct LocalProgress {
   LocalStage stage = LocalStage::kChecking;
-  int done = 0;  // photographs checked, cameras committed, surfaces judged again, thousandths of the mesh joined
+  int done = 0;  // photographs checked, thousandths of refining, cameras committed, surfaces judged again, thousandths
+                 // of the mesh joined
   int total = 0;
   double seconds_left = -1;   // until the mesh is there, from the cameras on; -1: nothing can be said
   int resumed_from = 0;       // cameras that were committed before this process started

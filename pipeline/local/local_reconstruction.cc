@@ -14,6 +14,7 @@
 #include "pipeline/config/parse_config.h"
 #include "pipeline/local/work_folder.h"
 #include "pipeline/options/options_json.h"
+#include "pipeline/refinement/refine_cameras.h"
 #include "pipeline/report/cameras_report.h"
 #include "pipeline/report/report_page.h"
 #include "pipeline/report/verdict.h"
@@ -136,6 +137,17 @@ Json PairsToJson(const Conductor& conductor) {
           {"cameras_without_pair", counts.cameras_without_pair}};
 }
 
+// How far they were off, and who wants to know more finds the poses in it.
+Json RefinementToJson(const CameraRefinement& refinement) {
+  Json json = {{"moved", refinement.moved()},
+               {"tie_points", refinement.tie_points},
+               {"error_px_before", refinement.error_px_before},
+               {"error_px_after", refinement.error_px_after},
+               {"off_px", refinement.off_px}};
+  if (!refinement.reason.empty()) json["reason"] = refinement.reason;
+  return json;
+}
+
 class LocalReconstruction {
  public:
   LocalReconstruction(const Scene& scene, const ReconstructionOptions& options, const LocalSettings& settings,
@@ -145,7 +157,8 @@ class LocalReconstruction {
   absl::StatusOr<Json> Run() {
     MW_RETURN_IF_ERROR(options_.Validate());
     MW_ASSIGN_OR_RETURN(format_, MeshFormatOfPath(settings_.output_path));
-    for (const std::string& path : {settings_.output_path, settings_.report_path, settings_.page_path}) {
+    for (const std::string& path :
+         {settings_.output_path, settings_.report_path, settings_.cameras_path, settings_.page_path}) {
       if (path.empty()) continue;
       MW_RETURN_IF_ERROR(CheckIsNoPhotograph(scene_, path));
       MW_RETURN_IF_ERROR(CheckWritable(path));
@@ -155,6 +168,7 @@ class LocalReconstruction {
     RemovePartialFiles(settings_.output_path);
     RemovePartialFiles(settings_.report_path);
     if (!settings_.page_path.empty()) RemovePartialFiles(settings_.page_path);
+    MW_RETURN_IF_ERROR(Refine());
     MW_RETURN_IF_ERROR(OpenLoop());
     absl::StatusOr<Json> report = RunJobsAndWriteResults();
     lease_->Release(clock_.Now()).IgnoreError();
@@ -184,6 +198,28 @@ class LocalReconstruction {
     MW_ASSIGN_OR_RETURN(
         work_, WorkFolder::Open(settings_.work_folder, digest, JsonText(ToJson(options_)), settings_.restart, clock_));
     return absl::OkStatus();
+  }
+
+  // Once: what came out of it is kept with the state.
+  absl::Status Refine() {
+    const std::string path = work_->RefinementPath();
+    const absl::StatusOr<std::string> kept = ReadFile(path);
+    if (kept.ok()) {
+      MW_ASSIGN_OR_RETURN(refinement_, DecodeCameraRefinement(*kept));
+      return ApplyRefinement(refinement_, scene_);
+    }
+    Tell(LocalStage::kRefining, 0, kThousandths);
+    const RefinementEnvironment environment = {
+        .load = [this](const SceneView& view, int max_image_size) { return LoadUnchanged(view, max_image_size); },
+        .pool = &pool_,
+        .progress =
+            [this](double done) {
+              Tell(LocalStage::kRefining, static_cast<int>(kThousandths * done), kThousandths);
+              return true;
+            }};
+    MW_ASSIGN_OR_RETURN(refinement_, RefineCameras(scene_, options_, environment));
+    MW_RETURN_IF_ERROR(WriteFileAtomically(path, EncodeCameraRefinement(refinement_)));
+    return ApplyRefinement(refinement_, scene_);
   }
 
   absl::Status OpenLoop() {
@@ -222,8 +258,11 @@ class LocalReconstruction {
   }
 
   absl::Status RunJobs() {
-    ViewCache views([&](CameraIndex camera) { return LoadUnchangedView(camera); },
-                    ViewCacheBytes(cameras_, options_, settings_));
+    ViewCache views(
+        [&](CameraIndex camera) {
+          return LoadUnchanged(scene_.views[static_cast<size_t>(camera)], options_.max_image_size);
+        },
+        ViewCacheBytes(cameras_, options_, settings_));
     const CameraJobInputMaker inputs(scene_, cameras_, views, *blobs_, options_.job.lattice_step);
     JobRunner runner({.scene = scene_,
                       .inputs = inputs,
@@ -245,10 +284,9 @@ class LocalReconstruction {
   }
 
   // What was digested for the work folder and what is used must be the same.
-  absl::StatusOr<View> LoadUnchangedView(CameraIndex camera) const {
-    const auto index = static_cast<size_t>(camera);
-    const SceneView& scene_view = scene_.views[index];
-    absl::StatusOr<View> view = LoadView(scene_view, options_.max_image_size);
+  absl::StatusOr<View> LoadUnchanged(const SceneView& scene_view, int max_image_size) const {
+    const auto index = static_cast<size_t>(&scene_view - scene_.views.data());
+    absl::StatusOr<View> view = LoadView(scene_view, max_image_size);
     if (StampOf(scene_view.image_path) == stamps_[index]) return view;
     return BadInput(absl::FailedPreconditionError(
         absl::StrCat(scene_view.image_path,
@@ -294,6 +332,7 @@ class LocalReconstruction {
     MW_ASSIGN_OR_RETURN(Json cameras,
                         MakeCamerasReport(scene_, work_->store(), WorkFolder::kReconstructionId, &totals_));
     cameras["verdict"] = MakeVerdict(judged_surfaces.cameras, cameras["cameras"]);
+    if (refinement_.moved()) cameras["verdict"]["refined_px"] = refinement_.off_px;
     if (surfaces.empty()) return absl::FailedPreconditionError(DescribeNothing(totals_, options_));
     if (!settings_.parts_folder.empty()) {
       MW_RETURN_IF_ERROR(WriteParts(scene_, surfaces, *blobs_, settings_.parts_folder));
@@ -321,9 +360,21 @@ class LocalReconstruction {
     Json report = MakeReport(counts, std::move(cameras));
     if (!texture.is_null()) report["texture"] = std::move(texture);
     if (settings_.add_to_report) MW_RETURN_IF_ERROR(settings_.add_to_report(ply_path, report));
+    MW_RETURN_IF_ERROR(WriteRefinedCameras());
     MW_RETURN_IF_ERROR(WriteFileAtomically(settings_.report_path, JsonText(report, 2) + "\n"));
     if (!settings_.page_path.empty()) MW_RETURN_IF_ERROR(WritePage(ply_path, report));
     return report;
+  }
+
+  // For whatever is done next with mesh and photographs. Those of an earlier run would be taken for this one's.
+  absl::Status WriteRefinedCameras() const {
+    if (settings_.cameras_path.empty()) return absl::OkStatus();
+    if (refinement_.moved()) {
+      return WriteFileAtomically(settings_.cameras_path, EncodeCameraRefinement(refinement_) + "\n");
+    }
+    std::error_code error;
+    fs::remove(settings_.cameras_path, error);
+    return absl::OkStatus();
   }
 
   absl::Status WritePage(const std::string& ply_path, const Json& report) {
@@ -373,6 +424,7 @@ class LocalReconstruction {
                        {"photographs", scene_.views.size()},
                        {"sparse_points", scene_.points.size()},
                        {"pairs", PairsToJson(loop_->conductor())}};
+    report["scene"]["refinement"] = RefinementToJson(refinement_);
     // world = local + offset
     if (!scene_.offset.isZero(0)) report["scene"]["offset"] = {scene_.offset.x(), scene_.offset.y(), scene_.offset.z()};
     report["options"] = ToJson(options_);
@@ -389,7 +441,7 @@ class LocalReconstruction {
     return report;
   }
 
-  const Scene& scene_;
+  Scene scene_;  // with the cameras as they are refined
   const ReconstructionOptions& options_;
   const LocalSettings& settings_;
   const CameraJobFunction& job_;
@@ -401,6 +453,7 @@ class LocalReconstruction {
   const MeshFormat* format_ = nullptr;
   std::vector<Camera> cameras_;
   std::unique_ptr<WorkFolder> work_;
+  CameraRefinement refinement_;
   std::optional<LostBlobNamer> blobs_;  // of the work folder
   std::optional<HeldConductorLease> lease_;
   std::unique_ptr<OuterLoop> loop_;
@@ -414,6 +467,8 @@ std::string NameOf(LocalStage stage) {
   switch (stage) {
     case LocalStage::kChecking:
       return "checking photographs";
+    case LocalStage::kRefining:
+      return "refining cameras";
     case LocalStage::kPairs:
       return "finding pairs";
     case LocalStage::kCameras:

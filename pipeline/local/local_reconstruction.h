@@ -28,6 +28,7 @@ struct LocalSettings {
   // with colours at its vertices.
   std::optional<TextureOptions> texture;
   std::string report_path;               // report.json
+  std::string cameras_path;              // gets the refined cameras if they were moved; "": nowhere
   std::string page_path;                 // the report as one HTML page; "": none
   std::string parts_folder;              // one PLY per reference camera; "": none
   std::string work_folder;               // state and surfaces

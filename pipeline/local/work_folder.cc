@@ -27,6 +27,7 @@ namespace fs = std::filesystem;
 
 constexpr char kState[] = "state.sqlite";
 constexpr char kBlobs[] = "blobs";
+constexpr char kRefinement[] = "cameras.json";
 constexpr char kMesh[] = "mesh.ply";
 
 absl::Status SystemError(const std::string& path, const std::string& what, int error) {
@@ -106,6 +107,8 @@ absl::Status WorkFolder::OpenStores(const std::string& scene_digest, const std::
   return absl::OkStatus();
 }
 
+std::string WorkFolder::RefinementPath() const { return absl::StrCat(path_, "/", kRefinement); }
+
 std::string WorkFolder::MeshPath() const { return absl::StrCat(path_, "/", kMesh); }
 
 absl::Status WorkFolder::RemoveContents() {
@@ -121,6 +124,8 @@ absl::Status WorkFolder::RemoveContents() {
   if (error) return SystemError(path_, "cannot remove the surfaces", error.value());
   fs::remove(MeshPath(), error);
   if (error) return SystemError(path_, "cannot remove the mesh", error.value());
+  fs::remove(RefinementPath(), error);
+  if (error) return SystemError(path_, "cannot remove the refined cameras", error.value());
   return absl::OkStatus();
 }
 

@@ -33,6 +33,8 @@ class WorkFolder {
 
   JobStore& store() { return *store_; }
   BlobStore& blobs() { return *blobs_; }
+  // For what came out of refining the cameras.
+  std::string RefinementPath() const;
   // For the mesh when another format is to be made of it.
   std::string MeshPath() const;
   // Whether there was something to go on from.

@@ -34,6 +34,11 @@ std::vector<Option> MakeTable() {
        "W: cameras chosen and not yet committed at the same time; part of the result, so a fixed number whatever the "
        "machine (README, order rule); 1 is the paper's sequential method",
        "more: more workers are busy at the same time, and some surface is computed twice", MW_FIELD(conductor.window)},
+      {"refine-cameras", kGeneral, "photographs", 0, kManyCameras,
+       "cameras are moved to where their photographs agree better, if they do by a twentieth at least, in scenes of at "
+       "most so many photographs; 0: they stay as they are",
+       "more: large scenes with cameras that are a little wrong are less torn, after a stage that one process does",
+       MW_FIELD(refine_cameras)},
       {"max-targets", kGeneral, "", 1, kMaxTargets, "images that a reference camera is compared with, at most",
        "more: steadier depths, in time that grows with it", MW_FIELD(conductor.targets.max_targets)},
 

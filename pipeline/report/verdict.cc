@@ -118,6 +118,9 @@ std::string DescribeVerdict(const Json& verdict) {
     text += absl::StrFormat("; least covered: %s, %.0f%%", (*least)["name"].get<std::string>(),
                             100 * NumberAt(*least, "coverage"));
   }
+  if (const double refined_px = NumberAt(verdict, "refined_px"); refined_px > 0) {
+    text += absl::StrFormat("; the cameras were %.2f px off and are refined", refined_px);
+  }
   return text;
 }
 

@@ -24,7 +24,7 @@ inline constexpr double kCamerasOffPx = 0.2;
 // unsupported: no other camera found the same; contradicted: as many look through it.
 nlohmann::ordered_json MakeVerdict(const std::vector<JudgedCamera>& judged, nlohmann::ordered_json& cameras);
 
-// A line for people: where the rays went.
+// A line for people: where the rays went, and, if the verdict has it, by how much cameras were refined ("refined_px").
 std::string DescribeVerdict(const nlohmann::ordered_json& verdict);
 // Another one when cameras seem to be off; "" otherwise.
 std::string DescribeWarning(const nlohmann::ordered_json& verdict);
