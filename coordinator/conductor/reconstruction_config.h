@@ -20,6 +20,7 @@ namespace meshwright {
 struct ReconstructionConfig {
   std::string options_json;  // canonical: every option with its value
   int max_image_size = 0;    // px, 0: as they are
+  int refine_cameras = 0;    // in scenes of at most so many photographs
   ConductorOptions conductor;
   JoinOptions join;
   // Bytes that the job takes at most, its input included.

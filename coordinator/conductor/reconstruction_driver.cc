@@ -17,6 +17,7 @@
 #include "common/base/status_macros.h"
 #include "common/base/utf8.h"
 #include "common/blob/lost_blob.h"
+#include "common/job/camera_refinement.h"
 #include "common/job/job_spec_codec.h"
 #include "common/scene/formats/import.h"
 #include "common/scene/scene_codec.h"
@@ -42,6 +43,8 @@ constexpr double kThousandths = 1000;
 
 // COLMAP is a process of its own, whose memory its worker does not know; a worker of the smallest kind takes the job.
 constexpr int64_t kEstimationBytes = int64_t{512} << 20;
+// A dozen photographs at a thousand pixels, and one as it is.
+constexpr int64_t kRefinementBytes = int64_t{384} << 20;
 
 bool IsPermanent(const absl::Status& status) {
   return IsBadInput(status) || absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status) ||
@@ -213,9 +216,9 @@ absl::Status ReconstructionDriver::RequestEstimation(const std::vector<Photograp
   return absl::OkStatus();
 }
 
-absl::Status ReconstructionDriver::WaitForEstimation() {
+absl::Status ReconstructionDriver::WaitFor(SequenceNumber preparation) {
   while (true) {
-    const absl::StatusOr<CameraJob> job = environment_.store->GetCameraJob(id_, kCameraEstimation);
+    const absl::StatusOr<CameraJob> job = environment_.store->GetCameraJob(id_, preparation);
     if (absl::IsNotFound(job.status())) return absl::OkStatus();
     MW_RETURN_IF_ERROR(job.status());
     if (job->state != CameraJobState::kAssigned) return absl::OkStatus();
@@ -250,6 +253,36 @@ absl::StatusOr<std::optional<Scene>> ReconstructionDriver::ReadOrEstimate(const 
   return scene;
 }
 
+absl::Status ReconstructionDriver::Refine(const std::string& given_scene_blob) {
+  const absl::Status known = environment_.store->GetCameraJob(id_, kCameraRefinement).status();
+  if (absl::IsNotFound(known)) {
+    const CameraAssignment job = {.sequence = kCameraRefinement,
+                                  .camera = kCameraRefinement,
+                                  .memory_bytes = kRefinementBytes,
+                                  .spec = given_scene_blob};
+    MW_RETURN_IF_ERROR(environment_.store->Advance(id_, {}, {job}, {}, environment_.clock->Now(), epoch_));
+    environment_.jobs_changed();
+  } else if (!known.ok()) {
+    return known;
+  }
+  return WaitFor(kCameraRefinement);
+}
+
+absl::StatusOr<std::string> ReconstructionDriver::RefinedSceneBlob(const std::string& given_scene_blob) {
+  const absl::StatusOr<CameraJob> job = environment_.store->GetCameraJob(id_, kCameraRefinement);
+  if (absl::IsNotFound(job.status())) return given_scene_blob;
+  MW_RETURN_IF_ERROR(job.status());
+  // Who could not refine them says so in the job; they are used as they are.
+  if (job->state == CameraJobState::kSkipped) return given_scene_blob;
+  MW_ASSIGN_OR_RETURN(const std::string text, environment_.blobs->Get(job->filtered_digest));
+  MW_ASSIGN_OR_RETURN(const CameraRefinement refinement, DecodeCameraRefinement(text));
+  if (!refinement.moved()) return given_scene_blob;
+  MW_ASSIGN_OR_RETURN(const std::string bytes, environment_.blobs->Get(given_scene_blob));
+  MW_ASSIGN_OR_RETURN(Scene scene, DecodeScene(bytes));
+  MW_RETURN_IF_ERROR(ApplyRefinement(refinement, scene));
+  return referenced_blobs_.Put(EncodeScene(scene));
+}
+
 absl::StatusOr<std::optional<IngestedScene>> ReconstructionDriver::Take() {
   MW_ASSIGN_OR_RETURN(const SceneFolder folder, FindSceneFolder());
   const auto take = [&]() -> absl::StatusOr<std::optional<IngestedScene>> {
@@ -269,15 +302,20 @@ absl::Status ReconstructionDriver::PrepareScene(const ReconstructionConfig& conf
   if (record_.scene_blob.empty()) {
     std::optional<IngestedScene> taken;
     while (!taken.has_value()) {
-      MW_RETURN_IF_ERROR(WaitForEstimation());
+      MW_RETURN_IF_ERROR(WaitFor(kCameraEstimation));
       MW_ASSIGN_OR_RETURN(taken, Take());
+    }
+    if (config.refine_cameras > 0) {
+      MW_RETURN_IF_ERROR(Refine(taken->scene_blob));
+      MW_ASSIGN_OR_RETURN(taken->scene_blob, RefinedSceneBlob(taken->scene_blob));
     }
     MW_RETURN_IF_ERROR(environment_.store->SetReconstructionScene(id_, taken->scene_digest, taken->scene_blob, epoch_));
     record_.scene_blob = taken->scene_blob;
   }
   absl::StatusOr<std::string> bytes = environment_.blobs->Get(record_.scene_blob);
   if (IsBlobLost(bytes.status())) {
-    MW_RETURN_IF_ERROR(Take().status());
+    MW_ASSIGN_OR_RETURN(const std::optional<IngestedScene> taken, Take());
+    if (taken.has_value()) MW_RETURN_IF_ERROR(RefinedSceneBlob(taken->scene_blob).status());
     bytes = environment_.blobs->Get(record_.scene_blob);
   }
   MW_RETURN_IF_ERROR(bytes.status());
@@ -334,7 +372,10 @@ absl::StatusOr<bool> ReconstructionDriver::RepairScene(const std::string& digest
   const std::string what = photograph == photographs_.end() ? "the scene's cameras and points"
                                                             : absl::StrCat("photograph ", photograph->second);
   const absl::StatusOr<std::optional<IngestedScene>> taken = Take();
-  if (taken.ok() && taken->has_value() && (*taken)->scene_blob == record_.scene_blob) return true;
+  if (taken.ok() && taken->has_value()) {
+    const absl::StatusOr<std::string> refined = RefinedSceneBlob((*taken)->scene_blob);
+    if (refined.ok() && *refined == record_.scene_blob) return true;
+  }
   if (!taken.ok() && !IsPermanent(taken.status()) && !absl::IsNotFound(taken.status())) return taken.status();
   return absl::DataLossError(
       absl::StrCat(what, " is damaged or lost (blob ", digest, "), and cannot be read again: ",

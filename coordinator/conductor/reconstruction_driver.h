@@ -92,7 +92,12 @@ class ReconstructionDriver {
   absl::StatusOr<std::optional<IngestedScene>> Take();
   absl::StatusOr<std::optional<Scene>> ReadOrEstimate(const std::string& folder);
   absl::Status RequestEstimation(const std::vector<PhotographFile>& photographs);
-  absl::Status WaitForEstimation();
+  // Until the job that prepares the scene has ended, if there is one.
+  absl::Status WaitFor(SequenceNumber preparation);
+  // Has a worker look whether the cameras agree with the photographs, and waits for it.
+  absl::Status Refine(const std::string& given_scene_blob);
+  // The blob of the scene with the cameras that came out of it; the given one where they stay.
+  absl::StatusOr<std::string> RefinedSceneBlob(const std::string& given_scene_blob);
   struct SceneFolder {
     std::string path;
     bool is_temporary = false;  // made for this, and to be removed

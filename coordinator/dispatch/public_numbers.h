@@ -5,8 +5,8 @@
 
 namespace meshwright {
 
-// How the job that estimates cameras is called outside: sequence 0, before all others, of camera -1, which is none.
-inline SequenceNumber PublicSequence(SequenceNumber sequence) { return sequence == kCameraEstimation ? 0 : sequence; }
-inline CameraIndex PublicCamera(CameraIndex camera) { return camera == kCameraEstimation ? -1 : camera; }
+// How the jobs that prepare a scene are called outside: sequence 0, before all others, of camera -1, which is none.
+inline SequenceNumber PublicSequence(SequenceNumber sequence) { return IsPreparation(sequence) ? 0 : sequence; }
+inline CameraIndex PublicCamera(CameraIndex camera) { return IsPreparation(camera) ? -1 : camera; }
 
 }  // namespace meshwright

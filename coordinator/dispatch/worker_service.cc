@@ -424,6 +424,17 @@ absl::StatusOr<v1::CameraJob> WorkerService::EstimationJob(const OpenJob& job, c
   return full;
 }
 
+absl::StatusOr<v1::CameraJob> WorkerService::RefinementJob(const OpenJob& job, const CameraJob& stored) {
+  MW_ASSIGN_OR_RETURN(const Reconstruction reconstruction, store_.GetReconstruction(job.reconstruction_id));
+  v1::CameraJob full;
+  FillKey(job, *full.mutable_key());
+  full.set_refine_cameras(true);
+  full.set_options_json(reconstruction.options_json);
+  full.set_scene_digest(stored.spec);
+  full.set_memory_bytes(job.memory_bytes);
+  return full;
+}
+
 absl::StatusOr<v1::CameraJob> WorkerService::FullJob(const OpenJob& job) {
   CameraJob& stored = claimed_[{job.reconstruction_id, job.sequence}];
   if (stored.spec.empty() || stored.epoch != job.epoch) {
@@ -431,6 +442,7 @@ absl::StatusOr<v1::CameraJob> WorkerService::FullJob(const OpenJob& job) {
     MW_ASSIGN_OR_RETURN(stored, store_.GetCameraJob(job.reconstruction_id, job.sequence));
   }
   if (job.sequence == kCameraEstimation) return EstimationJob(job, stored);
+  if (job.sequence == kCameraRefinement) return RefinementJob(job, stored);
   MW_ASSIGN_OR_RETURN(const CameraJobSpec spec, SpecOf(stored));
   MW_ASSIGN_OR_RETURN(const Background background, BackgroundOf(job.reconstruction_id));
   v1::CameraJob full;
@@ -479,7 +491,9 @@ void WorkerService::Publish(const SchedulingPass& pass, absl::Time now) {
   }
   const MutexLock lock(mutex_);
   for (auto it = steps_.begin(); it != steps_.end();) {
-    it = leased.count({it->first, kCameraEstimation}) > 0 ? std::next(it) : steps_.erase(it);
+    const bool is_prepared_here =
+        leased.count({it->first, kCameraEstimation}) > 0 || leased.count({it->first, kCameraRefinement}) > 0;
+    it = is_prepared_here ? std::next(it) : steps_.erase(it);
   }
   seen_ = pass.jobs();
   workers_ = written_workers_;
@@ -497,10 +511,11 @@ void WorkerService::NoteSteps(const WorkerReport& report) {
 std::string WorkerService::StageOf(const std::string& reconstruction) const {
   const MutexLock lock(mutex_);
   for (const OpenJob& job : seen_) {
-    if (job.reconstruction_id != reconstruction || job.sequence != kCameraEstimation) continue;
+    if (job.reconstruction_id != reconstruction || !IsPreparation(job.sequence)) continue;
     if (job.lease_worker.empty()) {
-      return HasWorkerWithColmap(job.method_version) ? "cameras: waiting for a worker"
-                                                     : "cameras: waiting for a worker with COLMAP";
+      const bool needs_colmap = job.sequence == kCameraEstimation;
+      return !needs_colmap || HasWorkerWithColmap(job.method_version) ? "cameras: waiting for a worker"
+                                                                      : "cameras: waiting for a worker with COLMAP";
     }
     const auto step = steps_.find(reconstruction);
     if (step == steps_.end()) return absl::StrCat("cameras: worker ", job.lease_worker, " begins");
@@ -546,6 +561,9 @@ std::vector<std::string> WorkerService::WarningsFor(const std::string& reconstru
             "no worker can estimate the photographs' cameras: start one where COLMAP is installed (apt-get install "
             "colmap), or submit the photographs with their cameras");
       }
+    } else if (job.sequence == kCameraRefinement && job.memory_bytes > fitting->second) {
+      warnings.push_back(absl::StrFormat("refining cameras needs %.1f GiB of memory, the largest worker has %.1f GiB",
+                                         Gibibytes(job.memory_bytes), Gibibytes(fitting->second)));
     } else if (job.memory_bytes > fitting->second) {
       warnings.push_back(absl::StrFormat(
           "camera %d needs %.1f GiB of memory, the largest worker has %.1f GiB: start a worker with more", job.camera,

@@ -103,6 +103,7 @@ class WorkerService {
   void RefuseImpostors(std::list<Call>& calls) const;
   absl::StatusOr<v1::CameraJob> FullJob(const OpenJob& job);
   static absl::StatusOr<v1::CameraJob> EstimationJob(const OpenJob& job, const CameraJob& stored);
+  absl::StatusOr<v1::CameraJob> RefinementJob(const OpenJob& job, const CameraJob& stored);
   void NoteSteps(const WorkerReport& report);
   bool IsAlive(const WorkerRecord& worker) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool HasWorkerWithColmap(int64_t method_version) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

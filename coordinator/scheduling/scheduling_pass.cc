@@ -13,7 +13,7 @@ namespace {
 
 // Renewing costs a write: done when a third of the lease is gone.
 constexpr double kRenewBelow = 2.0 / 3.0;
-constexpr int kLimitsOfEstimation = 12;
+constexpr int kLimitsOfPreparation = 12;
 
 absl::Duration DelayAfter(const RetryOptions& retry, int64_t attempt) {
   const int64_t doublings = std::min<int64_t>(attempt - 1, 20);
@@ -169,7 +169,7 @@ void SchedulingPass::ApplyFailed(size_t index, const JobFailed& failed) {
   const OpenJob& job = jobs_[index];
   const bool is_damage = ValidateDigest(failed.damaged_blob).ok();
   if (is_damage) damaged_blobs_.emplace_back(job.reconstruction_id, failed.damaged_blob);
-  if (failed.permanent && job.sequence == kCameraEstimation) {
+  if (failed.permanent && IsPreparation(job.sequence)) {
     JobChange change = ChangeOf(JobChange::Kind::kSkipped, job);
     change.reason = failed.reason;
     Add(index, std::move(change));
@@ -205,7 +205,7 @@ void SchedulingPass::Expire() {
 }
 
 absl::Duration SchedulingPass::TimeLimit(const OpenJob& job) const {
-  return job.sequence == kCameraEstimation ? kLimitsOfEstimation * lease_.job_time_limit : lease_.job_time_limit;
+  return IsPreparation(job.sequence) ? kLimitsOfPreparation * lease_.job_time_limit : lease_.job_time_limit;
 }
 
 bool SchedulingPass::Fits(const OpenJob& job, const WorkerReport& report, int64_t free_bytes) const {

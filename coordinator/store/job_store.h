@@ -67,6 +67,10 @@ enum class CameraJobState { kAssigned, kDone, kSkipped };
 // begins without them, with leases, failures and attempts as all jobs have them. It runs while the reconstruction is
 // being prepared; its result is a blob with the scene. ListCameraJobs and ListResults leave it out.
 constexpr SequenceNumber kCameraEstimation = std::numeric_limits<SequenceNumber>::max();
+// The same of the job that looks whether the cameras agree with the photographs, before the first camera's job; its
+// specification is the digest of the scene, its result that of a CameraRefinement.
+constexpr SequenceNumber kCameraRefinement = kCameraEstimation - 1;
+constexpr bool IsPreparation(SequenceNumber sequence) { return sequence >= kCameraRefinement; }
 
 struct CameraJob {
   SequenceNumber sequence = 0;

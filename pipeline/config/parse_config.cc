@@ -13,6 +13,7 @@ absl::StatusOr<ReconstructionConfig> ParseConfig(const std::string& options_json
   MW_ASSIGN_OR_RETURN(const ReconstructionOptions options, ParseOptions(options_json));
   ReconstructionConfig config = {.options_json = JsonText(ToJson(options)),
                                  .max_image_size = options.max_image_size,
+                                 .refine_cameras = options.refine_cameras,
                                  .conductor = options.conductor,
                                  .join = options.join};
   config.conductor.lattice_step = options.job.lattice_step;

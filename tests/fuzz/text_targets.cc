@@ -14,6 +14,7 @@
 #include "common/base/host_port.h"
 #include "common/base/relative_path.h"
 #include "common/http_server/request_parser.h"
+#include "common/job/camera_refinement.h"
 #include "common/job/job_spec_codec.h"
 #include "common/json/parse_json.h"
 #include "tests/fuzz/target.h"
@@ -44,6 +45,20 @@ void ReadSettings(const std::string& bytes) {
   const absl::StatusOr<std::vector<Setting>> settings = ParseSettingsFile("settings.conf", bytes);
   if (!settings.ok()) return;
   for (const Setting& setting : *settings) MW_CHECK(!setting.name.empty() && !setting.source.empty());
+}
+
+// What a worker says of the cameras.
+void ReadRefinedCameras(const std::string& bytes) {
+  const absl::StatusOr<CameraRefinement> refinement = DecodeCameraRefinement(bytes);
+  if (!refinement.ok()) return;
+  for (const Rigid3& pose : refinement->cam_from_world) {
+    MW_CHECK(pose.rotation.allFinite() && pose.translation.allFinite());
+  }
+  Scene scene;
+  scene.views.resize(refinement->cam_from_world.size());
+  MW_CHECK(ApplyRefinement(*refinement, scene).ok());
+  const std::string encoded = EncodeCameraRefinement(*refinement);
+  MW_CHECK(EncodeCameraRefinement(DecodeCameraRefinement(encoded).value()) == encoded);
 }
 
 void ReadJobSpec(const std::string& bytes) {
@@ -123,6 +138,11 @@ std::vector<Target> TextTargets() {
        ReadSettings,
        {"# a comment\nlisten = 127.0.0.1:7420\nscene-root = \"/data/a b\"\n\n; another\n", "data='x'\r\n"},
        {" = ", "\"", "'", "#", "listen"}},
+      {"refined_cameras",
+       ReadRefinedCameras,
+       {EncodeCameraRefinement({.cam_from_world = {Rigid3()}, .tie_points = 9, .off_px = 0.5}),
+        EncodeCameraRefinement({.reason = "not asked for"})},
+       {"cam_from_world", "[[", "1e308", "null"}},
       {"job_spec",
        ReadJobSpec,
        {EncodeJobSpec({.targets = {1, 2},

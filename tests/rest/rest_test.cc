@@ -46,8 +46,8 @@ class RestTest : public RestCluster {
     }
     return events;
   }
-  void Create(const std::string& id) {
-    const auto created = PostJson("/v1/reconstructions", R"({"id":")" + id + R"("})");
+  void Create(const std::string& id, const std::string& options = "{}") {
+    const auto created = PostJson("/v1/reconstructions", Json{{"id", id}, {"optionsJson", options}}.dump());
     ASSERT_TRUE(created && created->status == 200) << (created ? created->body : "");
   }
 };
@@ -302,7 +302,7 @@ TEST_F(RestTest, ADrainedWorkerGetsNothing) {
 
 // Cameras that cannot be read fail; why is in the log, and who tried.
 TEST_F(RestTest, TheLogSaysWhatFailedAndWhy) {
-  Create("poor");
+  Create("poor", R"({"refine-cameras": 0})");
   UploadScene("poor");
   ASSERT_EQ(http_->Post("/v1/reconstructions/poor:start")->status, 200);
   while (GetJson("/v1/reconstructions/poor")["progress"]["camerasTotal"] == 0) {

@@ -102,7 +102,7 @@ int Measure(const Settings& settings) {
     v1::CreateReconstructionRequest request;
     request.set_id(name_of(i));
     request.set_scene_reference(i == 0 ? "file:large" : "file:small");
-    request.set_options_json(absl::StrCat(R"({"window": )", settings.window, "}"));
+    request.set_options_json(absl::StrCat(R"({"refine-cameras": 0, "window": )", settings.window, "}"));
     MW_CHECK(client->Create(request).ok());
     const auto begun = client->Start(name_of(i));
     MW_CHECK(begun.ok());

@@ -15,6 +15,7 @@
 #include "common/base/clock.h"
 #include "common/base/status_macros.h"
 #include "common/base/utf8.h"
+#include "common/scene/scene_codec.h"
 #include "worker/job_input/run_job.h"
 
 namespace meshwright {
@@ -169,7 +170,9 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
   const Logger log = log_.With(FieldsOf(job.key())).With({{"camera", static_cast<int64_t>(job.camera())}});
   log.Info("job begun");
   const Stopwatch stopwatch(clock_);
-  v1::HeldJob told = job.photographs().empty() ? Process(job) : ProcessPhotographs(key, job);
+  v1::HeldJob told = job.refine_cameras()        ? ProcessRefinement(key, job)
+                     : job.photographs().empty() ? Process(job)
+                                                 : ProcessPhotographs(key, job);
   const double seconds = stopwatch.Seconds();
   if (told.has_failed()) {
     log.Error("job failed", {{"seconds", seconds}, {"error", told.failed().reason()}});
@@ -188,18 +191,59 @@ void Agent::Work(const Key& key, const v1::CameraJob& job) {
   channel_.Interrupt();
 }
 
+bool Agent::TellStep(const Key& key, const std::string& step, double fraction) {
+  const MutexLock lock(mutex_);
+  Held& held = held_.at(key);
+  if (held.told.has_running()) {
+    held.told.mutable_running()->set_step(step);
+    held.told.mutable_running()->set_fraction(fraction);
+  }
+  return !held.dropped && clock_.Uptime() < drain_until_;
+}
+
+v1::HeldJob Agent::ProcessRefinement(const Key& key, const v1::CameraJob& job) {
+  v1::HeldJob told;
+  *told.mutable_key() = job.key();
+  const auto process = [&]() -> absl::StatusOr<CameraRefinement> {
+    if (options_.refiner == nullptr) return absl::FailedPreconditionError("this worker refines no cameras");
+    MW_ASSIGN_OR_RETURN(const std::string bytes, blobs_.Get(job.scene_digest()));
+    MW_ASSIGN_OR_RETURN(const Scene scene, DecodeScene(bytes));
+    return options_.refiner(scene, job.options_json(), blobs_, pool_,
+                            [&](double done) { return TellStep(key, "refining", done); });
+  };
+  try {
+    const absl::StatusOr<CameraRefinement> refinement = process();
+    absl::StatusOr<std::string> digest = refinement.status();
+    if (refinement.ok()) digest = blobs_.Put(EncodeCameraRefinement(*refinement));
+    if (digest.ok()) {
+      CameraRefinement summary = *refinement;
+      summary.cam_from_world.clear();
+      told.mutable_finished()->set_filtered_digest(*digest);
+      told.mutable_finished()->set_report_json(EncodeCameraRefinement(summary));
+    } else if (absl::IsCancelled(digest.status())) {
+      told.mutable_released();
+    } else {
+      v1::HeldJob::Failed& failed = *told.mutable_failed();
+      failed.set_reason(ToUtf8(std::string(digest.status().message())));
+      failed.set_permanent(absl::IsFailedPrecondition(digest.status()));
+      failed.set_infrastructure(!IsJobsFault(digest.status()) && !failed.permanent());
+      failed.set_damaged_blob(LostBlobOf(digest.status()));
+    }
+  } catch (const std::bad_alloc&) {
+    told.mutable_failed()->set_reason("out of memory");
+    told.mutable_failed()->set_out_of_memory(true);
+  } catch (const std::exception& error) {
+    told.mutable_failed()->set_reason(absl::StrCat("cannot be processed: ", error.what()));
+  }
+  return told;
+}
+
 v1::HeldJob Agent::ProcessPhotographs(const Key& key, const v1::CameraJob& job) {
   const auto stop = [&] {
     const MutexLock lock(mutex_);
     return held_.at(key).dropped || clock_.Uptime() >= drain_until_;
   };
-  const auto progress = [&](const std::string& step, double fraction) {
-    const MutexLock lock(mutex_);
-    v1::HeldJob& told = held_.at(key).told;
-    if (!told.has_running()) return;
-    told.mutable_running()->set_step(step);
-    told.mutable_running()->set_fraction(fraction);
-  };
+  const auto progress = [&](const std::string& step, double fraction) { TellStep(key, step, fraction); };
   v1::HeldJob told;
   *told.mutable_key() = job.key();
   const absl::StatusOr<FinishedJob> finished =

@@ -20,12 +20,20 @@
 #include "common/base/thread_pool.h"
 #include "common/blob/blob_store.h"
 #include "common/blob/lost_blob.h"
+#include "common/job/camera_refinement.h"
+#include "common/scene/scene.h"
 #include "common/telemetry/log.h"
 #include "worker/agent/camera_estimation.h"
 #include "worker/agent/job_contexts.h"
 #include "worker/agent/worker_channel.h"
 
 namespace meshwright {
+
+// Looks whether a scene's cameras agree with its photographs. Its pictures are blobs. `progress`: how much is done;
+// false: stop, with Cancelled.
+using CameraRefiner = std::function<absl::StatusOr<CameraRefinement>(
+    const Scene& scene, const std::string& options_json, BlobStore& blobs, ThreadPool& pool,
+    const std::function<bool(double done)>& progress)>;
 
 struct AgentOptions {
   std::string worker_id;
@@ -40,6 +48,7 @@ struct AgentOptions {
   bool ran_out_of_memory = false;
   std::string work_folder;    // for estimating cameras
   CameraEstimator estimator;  // of a worker that can
+  CameraRefiner refiner;      // of a worker that can
 };
 
 // What RunCameraJob is, or something quick in tests.
@@ -73,6 +82,9 @@ class Agent {
   void Work(const Key& key, const v1::CameraJob& job);
   v1::HeldJob Process(const v1::CameraJob& job);
   v1::HeldJob ProcessPhotographs(const Key& key, const v1::CameraJob& job);
+  v1::HeldJob ProcessRefinement(const Key& key, const v1::CameraJob& job);
+  // Whether the job is to be given up, and for whom waits how far it is.
+  bool TellStep(const Key& key, const std::string& step, double fraction);
   v1::SynchronizeRequest NextRequest();
   void Follow(const v1::SynchronizeResponse& response);
   absl::Duration IdleFor();

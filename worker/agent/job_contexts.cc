@@ -8,6 +8,7 @@
 #include "common/base/status_macros.h"
 #include "common/scene/scene_codec.h"
 #include "common/scene/view.h"
+#include "worker/job_input/blob_views.h"
 
 namespace meshwright {
 namespace {
@@ -46,17 +47,8 @@ absl::StatusOr<std::shared_ptr<const JobContext>> JobContexts::Make(const std::s
   for (const SceneView& view : context->scene.views) {
     context->cameras.push_back(UndistortedCamera(view, max_image_size));
   }
-  const auto load = [&blobs = blobs_, &scene = context->scene,
-                     max_image_size](CameraIndex camera) -> absl::StatusOr<View> {
-    SceneView view = scene.views[static_cast<size_t>(camera)];
-    MW_ASSIGN_OR_RETURN(const std::string picture, blobs.Get(view.image_path));
-    std::string mask;
-    if (!view.mask_path.empty()) {
-      MW_ASSIGN_OR_RETURN(mask, blobs.Get(view.mask_path));
-      view.mask_path = view.name + " (its mask)";
-    }
-    view.image_path = view.name;  // what errors should name
-    return DecodeView(view, picture, mask, max_image_size);
+  const auto load = [&blobs = blobs_, &scene = context->scene, max_image_size](CameraIndex camera) {
+    return LoadViewFromBlobs(scene.views[static_cast<size_t>(camera)], max_image_size, blobs);
   };
   context->views = std::make_unique<ViewCache>(load, cache_bytes_);
   context->inputs = std::make_unique<CameraJobInputMaker>(context->scene, context->cameras, *context->views, blobs_,

@@ -23,6 +23,7 @@
 #include "common/telemetry/metrics_server.h"
 #include "worker/agent/agent.h"
 #include "worker/agent/grpc_coordinator.h"
+#include "worker/main/camera_refiner.h"
 #include "worker/main/colmap_estimator.h"
 #include "worker/main/parse_job_config.h"
 #include "worker/telemetry/measured_worker_channel.h"
@@ -93,7 +94,8 @@ class RealWorkerProgram final : public WorkerProgram {
                                                                    : absl::InfiniteDuration(),
              .ran_out_of_memory = settings.ran_out_of_memory,
              .work_folder = WorkFolder(),
-             .estimator = FindEstimator(log_)},
+             .estimator = FindEstimator(log_),
+             .refiner = MakeCameraRefiner()},
             channel_, blobs_, ParseJobConfig,
             [](const CameraJobInput& input, const CameraJobOptions& options, ThreadPool& pool) {
               return RunCameraJob(input, options, pool);

@@ -127,12 +127,12 @@ FROM camera_jobs WHERE reconstruction_id = :id AND sequence = :sequence;
 SELECT reconstruction_id, sequence, camera, snapshot, state, epoch, filtered_digest, weak_targets, report_json,
        set_aside_reason, memory_bytes, failed_attempts, out_of_memory_failures, last_failure, not_before,
        lease_worker, lease_expires_at, losses, reduction, expected_digest, neighbours, lease_instance, leased_at
-FROM camera_jobs WHERE reconstruction_id = :id AND sequence > :after AND sequence < 2147483647 ORDER BY sequence;
+FROM camera_jobs WHERE reconstruction_id = :id AND sequence > :after AND sequence < 2147483646 ORDER BY sequence;
 
 -- name: list_outcomes
 SELECT sequence, state, epoch, filtered_digest, weak_targets
 FROM camera_jobs
-WHERE reconstruction_id = :id AND sequence > :after AND sequence < 2147483647 AND state <> 'assigned' ORDER BY sequence;
+WHERE reconstruction_id = :id AND sequence > :after AND sequence < 2147483646 AND state <> 'assigned' ORDER BY sequence;
 
 -- name: list_open_jobs
 SELECT j.reconstruction_id, j.sequence, j.camera, j.epoch, j.memory_bytes, j.failed_attempts, j.losses, j.reduction,
