@@ -93,6 +93,13 @@ class ReducingSink final : public RowSink {
   std::optional<AreaReducer> reducer_;
 };
 
+// Wants to know only that there is a row.
+class ForgettingSink final : public RowSink {
+ public:
+  void Begin(ImageSize /*size*/) override {}
+  void Row(const uint8_t* /*rgb*/) override {}
+};
+
 // Nobody makes a server keep many pictures, or take all of its cores, by asking for many at once.
 Mutex& OneAtATime() {
   static Mutex mutex;
@@ -126,6 +133,25 @@ absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std:
   absl::StatusOr<ColorImage> image = decode();
   if (!image.ok()) return Named(name, image.status());
   return image;
+}
+
+absl::StatusOr<ImageSize> CheckImageBytes(const std::string& bytes, const std::string& name) {
+  const auto check = [&]() -> absl::StatusOr<ImageSize> {
+    MW_ASSIGN_OR_RETURN(const Codec* codec, FindCodec(bytes));
+    MW_ASSIGN_OR_RETURN(const ImageSize size, CheckedSize(*codec, bytes));
+    MW_RETURN_IF_ERROR(CheckPlausible(size, bytes.size()));
+    ForgettingSink sink;
+    const absl::Status by_rows = codec->decode_rows(bytes, 1, sink);
+    if (!by_rows.ok()) {
+      // Damaged, or too large to be read by rows: decoding it whole tells.
+      const MutexLock lock(OneAtATime());
+      MW_RETURN_IF_ERROR(codec->decode(bytes).status());
+    }
+    return size;
+  };
+  absl::StatusOr<ImageSize> size = check();
+  if (!size.ok()) return Named(name, size.status());
+  return size;
 }
 
 absl::StatusOr<ColorImage> DecodeReduced(const std::string& bytes, const std::string& name, int width) {

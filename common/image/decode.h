@@ -28,10 +28,15 @@ absl::StatusOr<ImageSize> ReadImageSize(const std::string& path);
 // not supported, truncated, damaged, larger than kMaxImagePixels).
 absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std::string& name);
 
-// The same, reduced to `width` columns and rows alike by the mean over the area of each pixel, unless it has fewer; for
-// looking at. One at a time in a process, and a few rows of it are kept, whatever its size: InvalidArgument for those
-// that their format makes one keep whole (progressive JPEG, interlaced PNG) where that takes more than some tens of
-// MiB.
+// The size of a picture that DecodeImageBytes would decode, found out by reading all of it, and otherwise its error. A
+// few rows are kept, whatever the size; the few pictures that their format makes one keep whole come one at a time
+// where they are large.
+absl::StatusOr<ImageSize> CheckImageBytes(const std::string& bytes, const std::string& name);
+
+// A picture, reduced to `width` columns and rows alike by the mean over the area of each pixel, unless it has fewer;
+// for looking at. One at a time in a process, and a few rows of it are kept, whatever its size: InvalidArgument for
+// those that their format makes one keep whole (progressive JPEG, interlaced PNG) where that takes more than some tens
+// of MiB.
 absl::StatusOr<ColorImage> DecodeReduced(const std::string& bytes, const std::string& name, int width);
 
 }  // namespace meshwright

@@ -252,6 +252,45 @@ TEST(DecodeImageBytes, HugePicturesAreRefusedFromTheHeader) {
   EXPECT_THAT(std::string(DecodeImageBytes(png, "huge.png").status().message()), HasSubstr("16384 x 16384 px out of"));
 }
 
+// To check is to decode without keeping.
+TEST(CheckImageBytes, TellsWhatDecodingTells) {
+  const ColorImage image = Picture(40, 24);
+  const std::vector<uint8_t> samples(image.rgb);
+  int damaged = 0;
+  for (const std::string& bytes :
+       {EncodePng(image), EncodeJpeg(image, 90), OtherJpeg(image, true, false, 0), OtherJpeg(image, false, true, 3),
+        OtherPng(40, 24, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_ADAM7, samples), "P6 4 4 255\n" + std::string(48, 'x')}) {
+    for (size_t i = 0; i < 2 * bytes.size(); ++i) {
+      std::string other = bytes;
+      if (i < bytes.size()) {
+        other[i] = static_cast<char>(other[i] ^ (1 << (i % 8)));
+      } else {
+        other.resize(i - bytes.size());
+      }
+      const absl::StatusOr<ColorImage> decoded = DecodeImageBytes(other, "x");
+      const absl::StatusOr<ImageSize> checked = CheckImageBytes(other, "x");
+      ASSERT_EQ(checked.status(), decoded.status()) << i;
+      if (!decoded.ok()) {
+        ++damaged;
+        continue;
+      }
+      ASSERT_EQ(checked->width, decoded->width);
+      ASSERT_EQ(checked->height, decoded->height);
+    }
+  }
+  EXPECT_GT(damaged, 1000);
+}
+
+TEST(CheckImageBytes, WhatCannotBeReadByRowsMayBeLarge) {
+  const ColorImage large = {.width = 5000, .height = 4000, .rgb = std::vector<uint8_t>(60'000'000, 200)};
+  for (const std::string& bytes : {OtherJpeg(large, true, false, 0),
+                                   OtherPng(5000, 4000, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_ADAM7, large.rgb)}) {
+    const absl::StatusOr<ImageSize> checked = CheckImageBytes(bytes, "x");
+    ASSERT_TRUE(checked.ok()) << checked.status();
+    EXPECT_EQ(checked->width, 5000);
+  }
+}
+
 TEST(DecodeReduced, IsTheMeanOverTheWholePicture) {
   const ColorImage image = Picture(500, 300);
   const std::vector<uint8_t> samples(image.rgb);

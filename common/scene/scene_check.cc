@@ -20,7 +20,7 @@ namespace {
 
 absl::StatusOr<std::string> CheckPhotograph(const SceneView& view) {
   MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(view.image_path));
-  MW_ASSIGN_OR_RETURN(const ColorImage image, DecodeImageBytes(bytes, view.image_path));
+  MW_ASSIGN_OR_RETURN(const ImageSize image, CheckImageBytes(bytes, view.image_path));
   if (image.width != view.lens.width || image.height != view.lens.height) {
     return absl::InvalidArgumentError(absl::StrCat(view.image_path, ": the picture is ", image.width, "x", image.height,
                                                    ", its camera expects ", view.lens.width, "x", view.lens.height));

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <malloc.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
@@ -210,6 +211,9 @@ absl::Status CoordinatorProgram::Check(const CoordinatorSettings& settings) { re
 
 absl::StatusOr<std::unique_ptr<CoordinatorProgram>> CoordinatorProgram::Start(const CoordinatorSettings& settings) {
   MW_RETURN_IF_ERROR(CheckSettings(settings));
+  // What is large, a photograph above all, goes back to the system when it is done with. By itself the allocator comes
+  // to keep blocks of up to 32 MiB, for each thread some.
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
   auto program = std::make_unique<RealCoordinatorProgram>(settings);
   MW_RETURN_IF_ERROR(program->Open());
   return program;

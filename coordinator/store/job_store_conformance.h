@@ -391,23 +391,25 @@ TEST_P(JobStoreConformance, OpenJobsAreThoseOfReconstructionsThatRun) {
   ASSERT_EQ(store().ListOpenJobs()->size(), 1);
 }
 
-TEST_P(JobStoreConformance, CamerasAreEstimatedBeforeItRunsByAJobThatIsNoCameras) {
-  Reconstruction prepared = kReconstruction;
-  prepared.id = "photographs";
-  prepared.state = ReconstructionState::kPreparing;
-  ASSERT_TRUE(store().CreateReconstruction(prepared, kNow).ok());
-  ASSERT_TRUE(Assign("photographs", {.sequence = kCameraEstimation, .camera = kCameraEstimation, .spec = "[]"}).ok());
-  const auto open = store().ListOpenJobs();
-  ASSERT_TRUE(open.ok()) << open.status();
-  ASSERT_EQ(open->size(), 1);
-  EXPECT_EQ(open->front().sequence, kCameraEstimation);
-  ASSERT_TRUE(Complete("photographs", kCameraEstimation, 1, Digest('e')).ok());
-  EXPECT_TRUE(store().ListCameraJobs("photographs")->empty());
-  EXPECT_TRUE(store().ListResults("photographs")->empty());
-  const auto job = store().GetCameraJob("photographs", kCameraEstimation);
-  ASSERT_TRUE(job.ok()) << job.status();
-  EXPECT_EQ(job->state, CameraJobState::kDone);
-  EXPECT_EQ(job->filtered_digest, Digest('e'));
+TEST_P(JobStoreConformance, ScenesArePreparedBeforeTheyRunByJobsThatAreNoCameras) {
+  for (const SequenceNumber preparation : {kCameraEstimation, kCameraRefinement}) {
+    Reconstruction prepared = kReconstruction;
+    prepared.id = absl::StrCat("photographs-", preparation);
+    prepared.state = ReconstructionState::kPreparing;
+    ASSERT_TRUE(store().CreateReconstruction(prepared, kNow).ok());
+    ASSERT_TRUE(Assign(prepared.id, {.sequence = preparation, .camera = preparation, .spec = "[]"}).ok());
+    const auto open = store().ListOpenJobs();
+    ASSERT_TRUE(open.ok()) << open.status();
+    ASSERT_EQ(open->size(), 1);
+    EXPECT_EQ(open->front().sequence, preparation);
+    ASSERT_TRUE(Complete(prepared.id, preparation, 1, Digest('e')).ok());
+    EXPECT_TRUE(store().ListCameraJobs(prepared.id)->empty());
+    EXPECT_TRUE(store().ListResults(prepared.id)->empty());
+    const auto job = store().GetCameraJob(prepared.id, preparation);
+    ASSERT_TRUE(job.ok()) << job.status();
+    EXPECT_EQ(job->state, CameraJobState::kDone);
+    EXPECT_EQ(job->filtered_digest, Digest('e'));
+  }
 }
 
 TEST_P(JobStoreConformance, OnlyTheHolderRenews) {

@@ -186,7 +186,7 @@ struct Checked {
 
 absl::Status CheckMask(Photograph* photograph, std::string* digests) {
   MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(photograph->mask_path));
-  MW_ASSIGN_OR_RETURN(const ColorImage mask, DecodeImageBytes(bytes, photograph->mask_path));
+  MW_ASSIGN_OR_RETURN(const ImageSize mask, CheckImageBytes(bytes, photograph->mask_path));
   if (mask.width != photograph->size.width || mask.height != photograph->size.height) {
     return absl::InvalidArgumentError(absl::StrCat(photograph->mask_path, ": ", mask.width, " x ", mask.height,
                                                    " px; expected its photograph's ", photograph->size.width, " x ",
@@ -200,9 +200,9 @@ Checked CheckOne(Photograph* photograph) {
   Checked checked;
   const absl::StatusOr<std::string> bytes = ReadFile(photograph->path);
   if (!bytes.ok()) return {.photograph = bytes.status(), .mask = absl::OkStatus(), .digest = ""};
-  const absl::StatusOr<ColorImage> image = DecodeImageBytes(*bytes, photograph->path);
+  const absl::StatusOr<ImageSize> image = CheckImageBytes(*bytes, photograph->path);
   if (!image.ok()) return {.photograph = image.status(), .mask = absl::OkStatus(), .digest = ""};
-  photograph->size = {.width = image->width, .height = image->height};
+  photograph->size = *image;
   photograph->exif = ReadExifCamera(bytes->substr(0, size_t{1} << 17));
   checked.digest = Sha256Hex(*bytes);
   if (!photograph->mask_path.empty()) {

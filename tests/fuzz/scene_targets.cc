@@ -104,7 +104,10 @@ void ReadSceneBytes(const std::string& bytes) {
 
 void ReadPicture(const std::string& bytes) {
   const absl::StatusOr<ColorImage> image = DecodeImageBytes(bytes, "picture");
+  const absl::StatusOr<ImageSize> size = CheckImageBytes(bytes, "picture");
+  MW_CHECK(size.ok() == image.ok());
   if (!image.ok()) return;
+  MW_CHECK(size->width == image->width && size->height == image->height);
   MW_CHECK(image->rgb.size() == size_t{3} * static_cast<size_t>(image->width) * static_cast<size_t>(image->height));
 }
 

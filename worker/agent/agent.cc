@@ -204,30 +204,33 @@ bool Agent::TellStep(const Key& key, const std::string& step, double fraction) {
 v1::HeldJob Agent::ProcessRefinement(const Key& key, const v1::CameraJob& job) {
   v1::HeldJob told;
   *told.mutable_key() = job.key();
-  const auto process = [&]() -> absl::StatusOr<CameraRefinement> {
+  const auto process = [&]() -> absl::StatusOr<FinishedJob> {
     if (options_.refiner == nullptr) return absl::FailedPreconditionError("this worker refines no cameras");
     MW_ASSIGN_OR_RETURN(const std::string bytes, blobs_.Get(job.scene_digest()));
     MW_ASSIGN_OR_RETURN(const Scene scene, DecodeScene(bytes));
-    return options_.refiner(scene, job.options_json(), blobs_, pool_,
-                            [&](double done) { return TellStep(key, "refining", done); });
+    MW_ASSIGN_OR_RETURN(CameraRefinement refinement,
+                        options_.refiner(scene, job.options_json(), blobs_, pool_,
+                                         [&](double done) { return TellStep(key, "refining", done); }));
+    FinishedJob finished;
+    MW_ASSIGN_OR_RETURN(finished.filtered_digest, blobs_.Put(EncodeCameraRefinement(refinement)));
+    refinement.cam_from_world.clear();
+    finished.report_json = EncodeCameraRefinement(refinement);
+    return finished;
   };
   try {
-    const absl::StatusOr<CameraRefinement> refinement = process();
-    absl::StatusOr<std::string> digest = refinement.status();
-    if (refinement.ok()) digest = blobs_.Put(EncodeCameraRefinement(*refinement));
-    if (digest.ok()) {
-      CameraRefinement summary = *refinement;
-      summary.cam_from_world.clear();
-      told.mutable_finished()->set_filtered_digest(*digest);
-      told.mutable_finished()->set_report_json(EncodeCameraRefinement(summary));
-    } else if (absl::IsCancelled(digest.status())) {
+    const absl::StatusOr<FinishedJob> finished = process();
+    if (finished.ok()) {
+      told.mutable_finished()->set_filtered_digest(finished->filtered_digest);
+      told.mutable_finished()->set_report_json(finished->report_json);
+    } else if (absl::IsCancelled(finished.status())) {
       told.mutable_released();
     } else {
+      const absl::Status& status = finished.status();
       v1::HeldJob::Failed& failed = *told.mutable_failed();
-      failed.set_reason(ToUtf8(std::string(digest.status().message())));
-      failed.set_permanent(absl::IsFailedPrecondition(digest.status()));
-      failed.set_infrastructure(!IsJobsFault(digest.status()) && !failed.permanent());
-      failed.set_damaged_blob(LostBlobOf(digest.status()));
+      failed.set_reason(ToUtf8(std::string(status.message())));
+      failed.set_permanent(absl::IsFailedPrecondition(status));
+      failed.set_infrastructure(!IsJobsFault(status) && !failed.permanent());
+      failed.set_damaged_blob(LostBlobOf(status));
     }
   } catch (const std::bad_alloc&) {
     told.mutable_failed()->set_reason("out of memory");

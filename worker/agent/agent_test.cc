@@ -120,7 +120,8 @@ class AgentTest : public testing::Test {
       if (!options_json.empty()) return absl::InvalidArgumentError("no such option");
       return JobConfig{};
     };
-    const AgentOptions options = {.worker_id = "w", .cores = 2, .drain = drain, .exit_when_idle = exit_when_idle};
+    const AgentOptions options = {
+        .worker_id = "w", .cores = 2, .drain = drain, .exit_when_idle = exit_when_idle, .refiner = refiner_};
     agent_ = std::make_unique<Agent>(options, coordinator_, *blobs_, parse, std::move(job), Logger::Nowhere(), clock_);
     thread_ = std::thread([this] { agent_->Run(); });
   }
@@ -164,6 +165,7 @@ class AgentTest : public testing::Test {
   std::string scene_digest_;
   PlayedCoordinator coordinator_;
   ManualClock clock_;
+  CameraRefiner refiner_;
   std::unique_ptr<Agent> agent_;
   std::thread thread_;
 };
@@ -199,6 +201,51 @@ TEST_F(AgentTest, RunsAJobOnceHoweverOftenItIsNamed) {
     WaitForOutcome(v1::HeldJob::kFinished);
   }
   EXPECT_EQ(runs, 1);
+}
+
+TEST_F(AgentTest, RefinesCamerasAndTellsHowFarItIs) {
+  std::atomic<bool> goes_on = false;
+  refiner_ = [&](const Scene& scene, const std::string& options_json, BlobStore&, ThreadPool&,
+                 const std::function<bool(double)>& progress) -> absl::StatusOr<CameraRefinement> {
+    EXPECT_EQ(scene.views.size(), 2);
+    EXPECT_EQ(options_json, "{}");
+    while (!goes_on) {
+      if (!progress(0.25)) return absl::CancelledError("stopped");
+      absl::SleepFor(absl::Milliseconds(1));
+    }
+    return CameraRefinement{.cam_from_world = {Rigid3(), Rigid3()}, .tie_points = 7, .off_px = 0.5};
+  };
+  Start(Nothing);
+  v1::CameraJob job = Job(1);
+  job.set_refine_cameras(true);
+  job.set_options_json("{}");
+  coordinator_.Want({job});
+  for (double told = 0; told != 0.25;) {
+    coordinator_.Want({job});
+    const v1::SynchronizeRequest said = coordinator_.WaitFor([](const auto& any) { return any.held_size() == 1; });
+    ASSERT_EQ(said.held_size(), 1);
+    told = said.held(0).running().fraction();
+  }
+  goes_on = true;
+  const v1::HeldJob done = WaitForOutcome(v1::HeldJob::kFinished);
+  const auto refinement = DecodeCameraRefinement(*blobs_->Get(done.finished().filtered_digest()));
+  ASSERT_TRUE(refinement.ok()) << refinement.status();
+  EXPECT_EQ(refinement->cam_from_world.size(), 2);
+  // The row of the job need not hold all poses.
+  const auto summary = DecodeCameraRefinement(done.finished().report_json());
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  EXPECT_EQ(summary->off_px, 0.5);
+  EXPECT_FALSE(summary->moved());
+}
+
+TEST_F(AgentTest, WhoRefinesNoCamerasSaysSoForGood) {
+  Start(Nothing);
+  v1::CameraJob job = Job(1);
+  job.set_refine_cameras(true);
+  coordinator_.Want({job});
+  const v1::HeldJob failed = WaitForOutcome(v1::HeldJob::kFailed);
+  EXPECT_TRUE(failed.failed().permanent());
+  EXPECT_FALSE(failed.failed().infrastructure());
 }
 
 TEST_F(AgentTest, SaysWhenMemoryRanOut) {

@@ -140,7 +140,7 @@ SELECT j.reconstruction_id, j.sequence, j.camera, j.epoch, j.memory_bytes, j.fai
        CASE WHEN j.expected_digest IS NULL THEN 0 ELSE 1 END, r.method_version
 FROM camera_jobs AS j JOIN reconstructions AS r ON r.id = j.reconstruction_id
 WHERE j.state = 'assigned'
-  AND (r.state IN ('running', 'joining') OR (r.state = 'preparing' AND j.sequence = 2147483647))
+  AND (r.state IN ('running', 'joining') OR (r.state = 'preparing' AND j.sequence >= 2147483646))
 ORDER BY j.reconstruction_id, j.sequence;
 
 -- name: claim_camera_job
@@ -303,7 +303,7 @@ DELETE FROM damaged_blobs WHERE reconstruction_id = :id AND digest = :digest;
 -- name: count_assigned_camera_jobs
 SELECT count(*) FROM camera_jobs AS j JOIN reconstructions AS r ON r.id = j.reconstruction_id
 WHERE j.state = 'assigned'
-  AND (r.state IN ('running', 'joining') OR (r.state = 'preparing' AND j.sequence = 2147483647));
+  AND (r.state IN ('running', 'joining') OR (r.state = 'preparing' AND j.sequence >= 2147483646));
 
 -- name: count_reconstructions
 SELECT state, count(*) FROM reconstructions GROUP BY state;
