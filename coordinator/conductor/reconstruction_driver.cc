@@ -253,7 +253,7 @@ absl::StatusOr<std::optional<Scene>> ReconstructionDriver::ReadOrEstimate(const 
   return scene;
 }
 
-absl::Status ReconstructionDriver::Refine(const std::string& given_scene_blob) {
+absl::Status ReconstructionDriver::RequestRefinement(const std::string& given_scene_blob) {
   const absl::Status known = environment_.store->GetCameraJob(id_, kCameraRefinement).status();
   if (absl::IsNotFound(known)) {
     const CameraAssignment job = {.sequence = kCameraRefinement,
@@ -265,22 +265,45 @@ absl::Status ReconstructionDriver::Refine(const std::string& given_scene_blob) {
   } else if (!known.ok()) {
     return known;
   }
-  return WaitFor(kCameraRefinement);
+  return absl::OkStatus();
 }
 
-absl::StatusOr<std::string> ReconstructionDriver::RefinedSceneBlob(const std::string& given_scene_blob) {
+absl::StatusOr<std::optional<std::string>> ReconstructionDriver::RefinedSceneBlob(const std::string& given_scene_blob) {
   const absl::StatusOr<CameraJob> job = environment_.store->GetCameraJob(id_, kCameraRefinement);
   if (absl::IsNotFound(job.status())) return given_scene_blob;
   MW_RETURN_IF_ERROR(job.status());
   // Who could not refine them says so in the job; they are used as they are.
   if (job->state == CameraJobState::kSkipped) return given_scene_blob;
-  MW_ASSIGN_OR_RETURN(const std::string text, environment_.blobs->Get(job->filtered_digest));
-  MW_ASSIGN_OR_RETURN(const CameraRefinement refinement, DecodeCameraRefinement(text));
+  if (job->state == CameraJobState::kAssigned) {
+    if (job->expected_digest.empty() || job->failed_attempts < environment_.max_failures) return std::nullopt;
+    return absl::DataLossError(
+        absl::StrCat("the refined cameras are damaged or lost and cannot be made again: ", job->last_failure));
+  }
+  const absl::StatusOr<std::string> text = environment_.blobs->Get(job->filtered_digest);
+  if (IsBlobLost(text.status())) {
+    MW_RETURN_IF_ERROR(environment_.store->ReopenCameraJob(
+        id_, kCameraRefinement, job->epoch, job->filtered_digest,
+        absl::StrCat("the refined cameras are damaged or lost (blob ", job->filtered_digest, ")"), absl::UnixEpoch(),
+        epoch_));
+    environment_.jobs_changed();
+    return std::nullopt;
+  }
+  MW_RETURN_IF_ERROR(text.status());
+  MW_ASSIGN_OR_RETURN(const CameraRefinement refinement, DecodeCameraRefinement(*text));
   if (!refinement.moved()) return given_scene_blob;
   MW_ASSIGN_OR_RETURN(const std::string bytes, environment_.blobs->Get(given_scene_blob));
   MW_ASSIGN_OR_RETURN(Scene scene, DecodeScene(bytes));
   MW_RETURN_IF_ERROR(ApplyRefinement(refinement, scene));
   return referenced_blobs_.Put(EncodeScene(scene));
+}
+
+// Until it is known.
+absl::StatusOr<std::string> ReconstructionDriver::WaitForRefinedSceneBlob(const std::string& given_scene_blob) {
+  while (true) {
+    MW_ASSIGN_OR_RETURN(const std::optional<std::string> refined, RefinedSceneBlob(given_scene_blob));
+    if (refined.has_value()) return *refined;
+    MW_RETURN_IF_ERROR(WaitFor(kCameraRefinement));
+  }
 }
 
 absl::StatusOr<std::optional<IngestedScene>> ReconstructionDriver::Take() {
@@ -306,8 +329,8 @@ absl::Status ReconstructionDriver::PrepareScene(const ReconstructionConfig& conf
       MW_ASSIGN_OR_RETURN(taken, Take());
     }
     if (config.refine_cameras > 0) {
-      MW_RETURN_IF_ERROR(Refine(taken->scene_blob));
-      MW_ASSIGN_OR_RETURN(taken->scene_blob, RefinedSceneBlob(taken->scene_blob));
+      MW_RETURN_IF_ERROR(RequestRefinement(taken->scene_blob));
+      MW_ASSIGN_OR_RETURN(taken->scene_blob, WaitForRefinedSceneBlob(taken->scene_blob));
     }
     MW_RETURN_IF_ERROR(environment_.store->SetReconstructionScene(id_, taken->scene_digest, taken->scene_blob, epoch_));
     record_.scene_blob = taken->scene_blob;
@@ -315,7 +338,7 @@ absl::Status ReconstructionDriver::PrepareScene(const ReconstructionConfig& conf
   absl::StatusOr<std::string> bytes = environment_.blobs->Get(record_.scene_blob);
   if (IsBlobLost(bytes.status())) {
     MW_ASSIGN_OR_RETURN(const std::optional<IngestedScene> taken, Take());
-    if (taken.has_value()) MW_RETURN_IF_ERROR(RefinedSceneBlob(taken->scene_blob).status());
+    if (taken.has_value()) MW_RETURN_IF_ERROR(WaitForRefinedSceneBlob(taken->scene_blob).status());
     bytes = environment_.blobs->Get(record_.scene_blob);
   }
   MW_RETURN_IF_ERROR(bytes.status());
@@ -373,8 +396,9 @@ absl::StatusOr<bool> ReconstructionDriver::RepairScene(const std::string& digest
                                                             : absl::StrCat("photograph ", photograph->second);
   const absl::StatusOr<std::optional<IngestedScene>> taken = Take();
   if (taken.ok() && taken->has_value()) {
-    const absl::StatusOr<std::string> refined = RefinedSceneBlob((*taken)->scene_blob);
-    if (refined.ok() && *refined == record_.scene_blob) return true;
+    MW_ASSIGN_OR_RETURN(const std::optional<std::string> refined, RefinedSceneBlob((*taken)->scene_blob));
+    if (!refined.has_value()) return false;  // being made again
+    if (*refined == record_.scene_blob) return true;
   }
   if (!taken.ok() && !IsPermanent(taken.status()) && !absl::IsNotFound(taken.status())) return taken.status();
   return absl::DataLossError(

@@ -94,10 +94,12 @@ class ReconstructionDriver {
   absl::Status RequestEstimation(const std::vector<PhotographFile>& photographs);
   // Until the job that prepares the scene has ended, if there is one.
   absl::Status WaitFor(SequenceNumber preparation);
-  // Has a worker look whether the cameras agree with the photographs, and waits for it.
-  absl::Status Refine(const std::string& given_scene_blob);
-  // The blob of the scene with the cameras that came out of it; the given one where they stay.
-  absl::StatusOr<std::string> RefinedSceneBlob(const std::string& given_scene_blob);
+  // Has a worker look whether the cameras agree with the photographs.
+  absl::Status RequestRefinement(const std::string& given_scene_blob);
+  // The blob of the scene with the cameras that came out of it; the given one where they stay. Nothing yet: a worker is
+  // at it, also for a second time when what came out is lost.
+  absl::StatusOr<std::optional<std::string>> RefinedSceneBlob(const std::string& given_scene_blob);
+  absl::StatusOr<std::string> WaitForRefinedSceneBlob(const std::string& given_scene_blob);
   struct SceneFolder {
     std::string path;
     bool is_temporary = false;  // made for this, and to be removed

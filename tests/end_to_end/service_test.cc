@@ -121,7 +121,8 @@ TEST(ServiceTest, WhoWaitsGoesOnWhenTheCoordinatorIsRestarted) {
       With({"submit", SharedScene("small"), "--id", "waited", "-o", mesh, "--coordinator", service.address()},
            kQuickOptions),
       log);
-  ASSERT_TRUE(WaitUntil([&] { return ReadBytes(log).find("running") != std::string::npos; }, 60)) << ReadBytes(log);
+  ASSERT_TRUE(WaitUntil([&] { return ReadBytes(log).find("waiting for a worker") != std::string::npos; }, 60))
+      << ReadBytes(log);
   coordinator->Stop(SIGKILL);
   ASSERT_TRUE(WaitUntil([&] { return ReadBytes(log).find("waiting for it") != std::string::npos; }, 30))
       << ReadBytes(log);

@@ -63,7 +63,9 @@ class AttacksTest : public RestCluster {
  protected:
   void SetUp() override {
     RestCluster::SetUp();
-    ASSERT_EQ(PostJson("/v1/reconstructions", R"({"id":"victim"})")->status, 200);
+    // No worker is there that could refine the cameras.
+    ASSERT_EQ(PostJson("/v1/reconstructions", R"({"id":"victim","optionsJson":"{\"refine-cameras\":0}"})")->status,
+              200);
   }
   void AskForTokens() {
     Stop();
