@@ -11,6 +11,7 @@
 #include "common/base/status_macros.h"
 #include "common/json/json_text.h"
 #include "common/json/parse_json.h"
+#include "common/json/whole_number.h"
 
 namespace meshwright {
 namespace {
@@ -61,12 +62,14 @@ absl::StatusOr<CameraRefinement> DecodeCameraRefinement(const std::string& text)
   if (!json.ok()) return absl::DataLossError(absl::StrCat("refined cameras: ", json.status().message()));
   CameraRefinement refinement;
   try {
-    refinement.tie_points = json->at("tie_points").get<int64_t>();
+    const absl::StatusOr<int64_t> tie_points = WholeNumber<int64_t>(json->at("tie_points"));
+    if (!tie_points.ok()) return absl::DataLossError(absl::StrCat("refined cameras: ", tie_points.status().message()));
+    refinement.tie_points = *tie_points;
     refinement.error_px_before = json->at("error_px_before").get<double>();
     refinement.error_px_after = json->at("error_px_after").get<double>();
     refinement.off_px = json->at("off_px").get<double>();
     refinement.reason = json->at("reason").get<std::string>();
-    for (const Json& pose : json->at("cam_from_world")) {
+    for (const Json& pose : json->at("cam_from_world").get_ref<const Json::array_t&>()) {
       MW_ASSIGN_OR_RETURN(refinement.cam_from_world.emplace_back(), PoseOf(pose));
     }
   } catch (const Json::exception& error) {

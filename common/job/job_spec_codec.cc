@@ -4,8 +4,10 @@
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 
+#include "common/base/status_macros.h"
 #include "common/json/json_text.h"
 #include "common/json/parse_json.h"
+#include "common/json/whole_number.h"
 
 namespace meshwright {
 
@@ -15,6 +17,13 @@ namespace {
 
 // A job may look at many surfaces that were accepted before.
 constexpr JsonLimits kLimits = {.max_bytes = size_t{256} << 20, .max_depth = 3};
+
+template <typename T>
+absl::StatusOr<T> NumberOf(const Json& json) {
+  absl::StatusOr<T> number = WholeNumber<T>(json);
+  if (number.ok()) return number;
+  return absl::DataLossError(absl::StrCat("not a camera job's specification: ", number.status().message()));
+}
 
 }  // namespace
 
@@ -33,13 +42,18 @@ absl::StatusOr<StoredJobSpec> DecodeJobSpec(const std::string& text) {
     return absl::DataLossError(absl::StrCat("a camera job's specification ", parsed.status().message()));
   const Json& json = *parsed;
   try {
-    spec.targets = json.at("targets").get<std::vector<CameraIndex>>();
-    spec.memory_bytes = json.at("memory_bytes").get<std::vector<int64_t>>();
-    for (const Json& surface : json.at("accepted")) {
-      spec.accepted.push_back({.sequence = surface.at(0).get<SequenceNumber>(),
-                               .camera = surface.at(1).get<CameraIndex>(),
-                               .digest = surface.at(2).get<std::string>(),
-                               .patches = surface.at(3).get<int64_t>()});
+    for (const Json& target : json.at("targets").get_ref<const Json::array_t&>()) {
+      MW_ASSIGN_OR_RETURN(spec.targets.emplace_back(), NumberOf<CameraIndex>(target));
+    }
+    for (const Json& bytes : json.at("memory_bytes").get_ref<const Json::array_t&>()) {
+      MW_ASSIGN_OR_RETURN(spec.memory_bytes.emplace_back(), NumberOf<int64_t>(bytes));
+    }
+    for (const Json& surface : json.at("accepted").get_ref<const Json::array_t&>()) {
+      AcceptedSurface& accepted = spec.accepted.emplace_back();
+      MW_ASSIGN_OR_RETURN(accepted.sequence, NumberOf<SequenceNumber>(surface.at(0)));
+      MW_ASSIGN_OR_RETURN(accepted.camera, NumberOf<CameraIndex>(surface.at(1)));
+      accepted.digest = surface.at(2).get<std::string>();
+      MW_ASSIGN_OR_RETURN(accepted.patches, NumberOf<int64_t>(surface.at(3)));
     }
   } catch (const Json::exception& error) {
     return absl::DataLossError(absl::StrCat("not a camera job's specification: ", error.what()));
@@ -60,7 +74,7 @@ absl::StatusOr<std::vector<StoredPhotograph>> DecodePhotographs(const std::strin
   if (!json.ok()) return absl::DataLossError(absl::StrCat("a list of photographs ", json.status().message()));
   std::vector<StoredPhotograph> photographs;
   try {
-    for (const Json& photograph : json->at("photographs")) {
+    for (const Json& photograph : json->at("photographs").get_ref<const Json::array_t&>()) {
       photographs.push_back(
           {.path = photograph.at(0).get<std::string>(), .digest = photograph.at(1).get<std::string>()});
     }

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/json/parse_json.h"
 
+#include <cstdint>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "common/json/whole_number.h"
 
 namespace meshwright {
 namespace {
@@ -48,6 +52,18 @@ TEST(ParseJsonTest, WhatIsNoJsonIsRefused) {
   for (const char* text : {"", "{", "{\"a\":}", "nan", "[1,]", "\"\xff\"", "1e999", "{} x", "\"", "[\"\\"}) {
     EXPECT_EQ(Refusal(text), "is not valid JSON") << text;
   }
+}
+
+TEST(WholeNumber, IsOneOfItsTypeOrAnError) {
+  EXPECT_EQ(WholeNumber<int>(*ParseJson("-7")).value(), -7);
+  EXPECT_EQ(WholeNumber<int64_t>(*ParseJson("9223372036854775807")).value(), INT64_MAX);
+  EXPECT_EQ(WholeNumber<uint8_t>(*ParseJson("255")).value(), 255);
+  for (const char* text :
+       {"1e99", "1.0", "2147483648", "-2147483649", "18446744073709551615", "null", "\"1\"", "true"}) {
+    EXPECT_TRUE(absl::IsInvalidArgument(WholeNumber<int>(*ParseJson(text)).status())) << text;
+  }
+  EXPECT_FALSE(WholeNumber<uint8_t>(*ParseJson("-1")).ok());
+  EXPECT_FALSE(WholeNumber<int64_t>(*ParseJson("9223372036854775808")).ok());
 }
 
 }  // namespace

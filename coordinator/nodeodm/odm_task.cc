@@ -9,6 +9,7 @@
 
 #include "common/base/check.h"
 #include "common/json/parse_json.h"
+#include "common/json/whole_number.h"
 
 namespace meshwright {
 namespace {
@@ -81,26 +82,34 @@ std::string EncodeTask(const OdmTask& task) {
 absl::StatusOr<OdmTask> DecodeTask(const std::string& text) {
   const auto json = ParseJson<nlohmann::ordered_json>(text, {.max_bytes = kMaxTaskBytes, .max_depth = kMaxDepth});
   if (!json.ok()) return absl::DataLossError(absl::StrCat("a task ", std::string(json.status().message())));
+  bool are_whole = true;
+  const auto whole = [&]<typename T>(const char* key, T& to) {
+    const absl::StatusOr<T> number = WholeNumber<T>(json->at(key));
+    are_whole = are_whole && number.ok();
+    to = number.value_or(0);
+  };
   try {
     OdmTask task = {.uuid = json->at("uuid"),
-                    .run = json->at("run"),
                     .name = json->at("name"),
                     .owner = json->value("owner", ""),  // earlier programs knew none
                     .options = json->at("options"),
                     .outputs = json->at("outputs"),
                     .webhook = json->at("webhook"),
                     .is_committed = json->at("committed"),
-                    .created_ms = json->at("created_ms"),
-                    .begun_ms = json->at("begun_ms"),
-                    .ended_ms = json->at("ended_ms"),
-                    .status = static_cast<OdmStatus>(json->at("status").get<int>()),
                     .error = json->at("error"),
                     .progress = json->at("progress"),
-                    .images = json->at("images"),
-                    .longest_side_px = json->at("longest_side_px"),
-                    .parts_told = json->at("parts_told"),
                     .has_result = json->at("has_result")};
-    if (IsUuid(task.uuid)) return task;
+    int status = 0;
+    whole("run", task.run);
+    whole("created_ms", task.created_ms);
+    whole("begun_ms", task.begun_ms);
+    whole("ended_ms", task.ended_ms);
+    whole("status", status);
+    whole("images", task.images);
+    whole("longest_side_px", task.longest_side_px);
+    whole("parts_told", task.parts_told);
+    task.status = static_cast<OdmStatus>(status);
+    if (are_whole && IsUuid(task.uuid)) return task;
   } catch (const nlohmann::json::exception&) {
     // Said below.
   }

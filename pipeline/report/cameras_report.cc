@@ -51,7 +51,10 @@ absl::StatusOr<Json> MakeCamerasReport(const Scene& scene, JobStore& store, cons
       return absl::DataLossError("the store holds a report of a camera job that is not an object");
     }
     const Json& report = *parsed;
-    entry.update(report);
+    // A worker says what its job came to, not which camera's it was.
+    for (const auto& [key, value] : report.items()) {
+      if (!entry.contains(key)) entry[key] = value;
+    }
     Json weak = Json::array();
     for (const CameraIndex target : job.weak_targets) weak.push_back(NameOf(scene, target));
     entry["weak_targets"] = std::move(weak);

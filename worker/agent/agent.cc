@@ -39,9 +39,47 @@ LogFields FieldsOf(const v1::JobKey& key) {
           {"attempt", static_cast<int64_t>(key.epoch())}};
 }
 
-// Errors that another attempt would meet again; all others are the network's or the store's.
-bool IsJobsFault(const absl::Status& status) {
-  return absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status);
+// What a failure counts against.
+enum class Blame {
+  kInfrastructure,  // the network or the store: nothing
+  kJob,             // an attempt of the job
+  kForGood,         // another attempt would meet the same
+};
+
+Blame BlameFor(const absl::Status& status) {
+  const bool is_the_jobs = absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status);
+  return is_the_jobs ? Blame::kJob : Blame::kInfrastructure;
+}
+
+// What is to be told of a job that `process` does, whatever becomes of it.
+v1::HeldJob OutcomeOf(const v1::JobKey& key, const std::function<absl::StatusOr<FinishedJob>()>& process,
+                      Blame (*blame_for)(const absl::Status& status)) {
+  v1::HeldJob told;
+  *told.mutable_key() = key;
+  try {
+    const absl::StatusOr<FinishedJob> finished = process();
+    if (finished.ok()) {
+      v1::HeldJob::Finished& result = *told.mutable_finished();
+      result.set_filtered_digest(finished->filtered_digest);
+      result.mutable_weak_targets()->Add(finished->weak_targets.begin(), finished->weak_targets.end());
+      result.set_report_json(finished->report_json);
+    } else if (absl::IsCancelled(finished.status())) {
+      told.mutable_released();
+    } else {
+      const Blame blame = blame_for(finished.status());
+      v1::HeldJob::Failed& failed = *told.mutable_failed();
+      failed.set_reason(ToUtf8(std::string(finished.status().message())));
+      failed.set_permanent(blame == Blame::kForGood);
+      failed.set_infrastructure(blame == Blame::kInfrastructure);
+      failed.set_damaged_blob(LostBlobOf(finished.status()));
+    }
+  } catch (const std::bad_alloc&) {
+    told.mutable_failed()->set_reason("out of memory");
+    told.mutable_failed()->set_out_of_memory(true);
+  } catch (const std::exception& error) {
+    told.mutable_failed()->set_reason(absl::StrCat("cannot be processed: ", error.what()));
+  }
+  return told;
 }
 
 absl::StatusOr<CameraJobSpec> ToSpec(const v1::CameraJob& job, size_t cameras) {
@@ -202,8 +240,6 @@ bool Agent::TellStep(const Key& key, const std::string& step, double fraction) {
 }
 
 v1::HeldJob Agent::ProcessRefinement(const Key& key, const v1::CameraJob& job) {
-  v1::HeldJob told;
-  *told.mutable_key() = job.key();
   const auto process = [&]() -> absl::StatusOr<FinishedJob> {
     if (options_.refiner == nullptr) return absl::FailedPreconditionError("this worker refines no cameras");
     MW_ASSIGN_OR_RETURN(const std::string bytes, blobs_.Get(job.scene_digest()));
@@ -217,28 +253,9 @@ v1::HeldJob Agent::ProcessRefinement(const Key& key, const v1::CameraJob& job) {
     finished.report_json = EncodeCameraRefinement(refinement);
     return finished;
   };
-  try {
-    const absl::StatusOr<FinishedJob> finished = process();
-    if (finished.ok()) {
-      told.mutable_finished()->set_filtered_digest(finished->filtered_digest);
-      told.mutable_finished()->set_report_json(finished->report_json);
-    } else if (absl::IsCancelled(finished.status())) {
-      told.mutable_released();
-    } else {
-      const absl::Status& status = finished.status();
-      v1::HeldJob::Failed& failed = *told.mutable_failed();
-      failed.set_reason(ToUtf8(std::string(status.message())));
-      failed.set_permanent(absl::IsFailedPrecondition(status));
-      failed.set_infrastructure(!IsJobsFault(status) && !failed.permanent());
-      failed.set_damaged_blob(LostBlobOf(status));
-    }
-  } catch (const std::bad_alloc&) {
-    told.mutable_failed()->set_reason("out of memory");
-    told.mutable_failed()->set_out_of_memory(true);
-  } catch (const std::exception& error) {
-    told.mutable_failed()->set_reason(absl::StrCat("cannot be processed: ", error.what()));
-  }
-  return told;
+  return OutcomeOf(job.key(), process, [](const absl::Status& status) {
+    return absl::IsFailedPrecondition(status) ? Blame::kForGood : BlameFor(status);
+  });
 }
 
 v1::HeldJob Agent::ProcessPhotographs(const Key& key, const v1::CameraJob& job) {
@@ -247,32 +264,18 @@ v1::HeldJob Agent::ProcessPhotographs(const Key& key, const v1::CameraJob& job) 
     return held_.at(key).dropped || clock_.Uptime() >= drain_until_;
   };
   const auto progress = [&](const std::string& step, double fraction) { TellStep(key, step, fraction); };
-  v1::HeldJob told;
-  *told.mutable_key() = job.key();
-  const absl::StatusOr<FinishedJob> finished =
-      options_.estimator.estimate == nullptr
-          ? absl::FailedPreconditionError("this worker has no COLMAP")
-          : EstimateCamerasOf(job, options_.estimator, blobs_, options_.work_folder, options_.cores, stop, progress);
-  if (finished.ok()) {
-    told.mutable_finished()->set_filtered_digest(finished->filtered_digest);
-    told.mutable_finished()->set_report_json(finished->report_json);
-  } else if (absl::IsCancelled(finished.status())) {
-    told.mutable_released();
-  } else {
-    const absl::Status& status = finished.status();
-    v1::HeldJob::Failed& failed = *told.mutable_failed();
-    failed.set_reason(std::string(status.message()));
-    failed.set_permanent(IsBadInput(status) || absl::IsFailedPrecondition(status));
+  const auto process = [&]() -> absl::StatusOr<FinishedJob> {
+    if (options_.estimator.estimate == nullptr) return absl::FailedPreconditionError("this worker has no COLMAP");
+    return EstimateCamerasOf(job, options_.estimator, blobs_, options_.work_folder, options_.cores, stop, progress);
+  };
+  return OutcomeOf(job.key(), process, [](const absl::Status& status) {
+    if (IsBadInput(status) || absl::IsFailedPrecondition(status)) return Blame::kForGood;
     // COLMAP that breaks down counts against the photographs, a folder or a blob that is not to be had does not.
-    failed.set_infrastructure(!failed.permanent() && !absl::IsInternal(status));
-    failed.set_damaged_blob(LostBlobOf(status));
-  }
-  return told;
+    return absl::IsInternal(status) ? Blame::kJob : Blame::kInfrastructure;
+  });
 }
 
 v1::HeldJob Agent::Process(const v1::CameraJob& job) {
-  v1::HeldJob told;
-  *told.mutable_key() = job.key();
   const auto process = [&]() -> absl::StatusOr<FinishedJob> {
     MW_ASSIGN_OR_RETURN(const std::shared_ptr<const JobContext> context,
                         contexts_.For(job.scene_digest(), job.options_json(), job.reduction()));
@@ -282,25 +285,7 @@ v1::HeldJob Agent::Process(const v1::CameraJob& job) {
     };
     return RunJob(context->scene, spec, *context->inputs, function, blobs_, pool_);
   };
-  try {
-    const absl::StatusOr<FinishedJob> finished = process();
-    if (finished.ok()) {
-      v1::HeldJob::Finished& result = *told.mutable_finished();
-      result.set_filtered_digest(finished->filtered_digest);
-      result.mutable_weak_targets()->Add(finished->weak_targets.begin(), finished->weak_targets.end());
-      result.set_report_json(finished->report_json);
-    } else {
-      told.mutable_failed()->set_reason(ToUtf8(std::string(finished.status().message())));
-      told.mutable_failed()->set_infrastructure(!IsJobsFault(finished.status()));
-      told.mutable_failed()->set_damaged_blob(LostBlobOf(finished.status()));
-    }
-  } catch (const std::bad_alloc&) {
-    told.mutable_failed()->set_reason("out of memory");
-    told.mutable_failed()->set_out_of_memory(true);
-  } catch (const std::exception& error) {
-    told.mutable_failed()->set_reason(absl::StrCat("cannot be processed: ", error.what()));
-  }
-  return told;
+  return OutcomeOf(job.key(), process, BlameFor);
 }
 
 absl::Duration Agent::IdleFor() {

@@ -83,7 +83,7 @@ class Agent {
   v1::HeldJob Process(const v1::CameraJob& job);
   v1::HeldJob ProcessPhotographs(const Key& key, const v1::CameraJob& job);
   v1::HeldJob ProcessRefinement(const Key& key, const v1::CameraJob& job);
-  // Whether the job is to be given up, and for whom waits how far it is.
+  // Tells who waits how far it is; false: the job is to be given up.
   bool TellStep(const Key& key, const std::string& step, double fraction);
   v1::SynchronizeRequest NextRequest();
   void Follow(const v1::SynchronizeResponse& response);
