@@ -49,8 +49,8 @@ struct BundleAdjustmentOptions {
   int min_observations = 20;  // of a camera; with fewer it stays as it is
 };
 
-// Moves the cameras to where their photographs agree better (Triggs et al. 2000, Bundle adjustment, section 6.1:
-// resection and intersection in turns): every track's point is put where its observations want it, then every camera
+// Moves the cameras to where their photographs agree better (Triggs et al. 2000, Bundle adjustment, by
+// alternation: resection and intersection in turns): every track's point is put where its observations want it, then every camera
 // where its points do. One step of it is local: a point looks at its cameras, a camera at its points, so work and
 // memory are linear in the observations and a camera's error goes to rest with its neighbours'. What it is slow at is
 // what bends a scene as a whole while neighbours agree, and that is for the cameras' maker to know. Intrinsics stay.
