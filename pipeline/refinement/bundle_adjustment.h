@@ -50,11 +50,11 @@ struct BundleAdjustmentOptions {
 };
 
 // Moves the cameras to where their photographs agree better (Triggs et al. 2000, Bundle adjustment, by
-// alternation: resection and intersection in turns): every track's point is put where its observations want it, then every camera
-// where its points do. One step of it is local: a point looks at its cameras, a camera at its points, so work and
-// memory are linear in the observations and a camera's error goes to rest with its neighbours'. What it is slow at is
-// what bends a scene as a whole while neighbours agree, and that is for the cameras' maker to know. Intrinsics stay.
-// The result does not depend on the number of threads.
+// alternation: resection and intersection in turns): every track's point is put where its observations want it, then
+// every camera where its points do. One step of it is local: a point looks at its cameras, a camera at its points, so
+// work and memory are linear in the observations and a camera's error goes to rest with its neighbours'. What it is
+// slow at is what bends a scene as a whole while neighbours agree, and that is for the cameras' maker to know.
+// Intrinsics stay. The result does not depend on the number of threads.
 std::vector<Camera> AdjustBundle(std::vector<Camera> cameras, const Tracks& tracks,
                                  const BundleAdjustmentOptions& options, ThreadPool& pool);
 
