@@ -61,6 +61,20 @@ absl::Status CheckPlausible(const ImageSize& size, size_t file_bytes) {
                                                  " px out of ", file_bytes, " bytes"));
 }
 
+// A picture that may be decoded.
+struct Recognized {
+  const Codec* codec = nullptr;
+  ImageSize size;
+};
+
+absl::StatusOr<Recognized> Recognize(const std::string& bytes) {
+  Recognized picture;
+  MW_ASSIGN_OR_RETURN(picture.codec, FindCodec(bytes));
+  MW_ASSIGN_OR_RETURN(picture.size, CheckedSize(*picture.codec, bytes));
+  MW_RETURN_IF_ERROR(CheckPlausible(picture.size, bytes.size()));
+  return picture;
+}
+
 absl::StatusOr<ImageSize> SizeFromBytes(const std::string& bytes) {
   MW_ASSIGN_OR_RETURN(const Codec* codec, FindCodec(bytes));
   return CheckedSize(*codec, bytes);
@@ -125,10 +139,8 @@ absl::StatusOr<ImageSize> ReadImageSize(const std::string& path) {
 
 absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std::string& name) {
   const auto decode = [&]() -> absl::StatusOr<ColorImage> {
-    MW_ASSIGN_OR_RETURN(const Codec* codec, FindCodec(bytes));
-    MW_ASSIGN_OR_RETURN(const ImageSize size, CheckedSize(*codec, bytes));
-    MW_RETURN_IF_ERROR(CheckPlausible(size, bytes.size()));
-    return codec->decode(bytes);
+    MW_ASSIGN_OR_RETURN(const Recognized picture, Recognize(bytes));
+    return picture.codec->decode(bytes);
   };
   absl::StatusOr<ColorImage> image = decode();
   if (!image.ok()) return Named(name, image.status());
@@ -137,17 +149,15 @@ absl::StatusOr<ColorImage> DecodeImageBytes(const std::string& bytes, const std:
 
 absl::StatusOr<ImageSize> CheckImageBytes(const std::string& bytes, const std::string& name) {
   const auto check = [&]() -> absl::StatusOr<ImageSize> {
-    MW_ASSIGN_OR_RETURN(const Codec* codec, FindCodec(bytes));
-    MW_ASSIGN_OR_RETURN(const ImageSize size, CheckedSize(*codec, bytes));
-    MW_RETURN_IF_ERROR(CheckPlausible(size, bytes.size()));
+    MW_ASSIGN_OR_RETURN(const Recognized picture, Recognize(bytes));
     ForgettingSink sink;
-    const absl::Status by_rows = codec->decode_rows(bytes, 1, sink);
+    const absl::Status by_rows = picture.codec->decode_rows(bytes, 1, sink);
     if (!by_rows.ok()) {
       // Damaged, or too large to be read by rows: decoding it whole tells.
       const MutexLock lock(OneAtATime());
-      MW_RETURN_IF_ERROR(codec->decode(bytes).status());
+      MW_RETURN_IF_ERROR(picture.codec->decode(bytes).status());
     }
-    return size;
+    return picture.size;
   };
   absl::StatusOr<ImageSize> size = check();
   if (!size.ok()) return Named(name, size.status());
@@ -156,12 +166,10 @@ absl::StatusOr<ImageSize> CheckImageBytes(const std::string& bytes, const std::s
 
 absl::StatusOr<ColorImage> DecodeReduced(const std::string& bytes, const std::string& name, int width) {
   const auto decode = [&]() -> absl::StatusOr<ColorImage> {
-    MW_ASSIGN_OR_RETURN(const Codec* codec, FindCodec(bytes));
-    MW_ASSIGN_OR_RETURN(const ImageSize size, CheckedSize(*codec, bytes));
-    MW_RETURN_IF_ERROR(CheckPlausible(size, bytes.size()));
+    MW_ASSIGN_OR_RETURN(const Recognized picture, Recognize(bytes));
     const MutexLock lock(OneAtATime());
     ReducingSink sink(width);
-    MW_RETURN_IF_ERROR(codec->decode_rows(bytes, width, sink));
+    MW_RETURN_IF_ERROR(picture.codec->decode_rows(bytes, width, sink));
     return sink.Take();
   };
   absl::StatusOr<ColorImage> image = decode();

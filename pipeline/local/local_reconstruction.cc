@@ -137,7 +137,7 @@ Json PairsToJson(const Conductor& conductor) {
           {"cameras_without_pair", counts.cameras_without_pair}};
 }
 
-// How far they were off, and who wants to know more finds the poses in it.
+// How far they were off; the poses themselves are in settings_.cameras_path.
 Json RefinementToJson(const CameraRefinement& refinement) {
   Json json = {{"moved", refinement.moved()},
                {"tie_points", refinement.tie_points},
@@ -210,7 +210,7 @@ class LocalReconstruction {
     }
     Tell(LocalStage::kRefining, 0, kThousandths);
     const RefinementEnvironment environment = {
-        .load = [this](const SceneView& view, int max_image_size) { return LoadUnchanged(view, max_image_size); },
+        .load = [this](CameraIndex camera, int max_image_size) { return LoadUnchanged(camera, max_image_size); },
         .pool = &pool_,
         .progress =
             [this](double done) {
@@ -258,11 +258,8 @@ class LocalReconstruction {
   }
 
   absl::Status RunJobs() {
-    ViewCache views(
-        [&](CameraIndex camera) {
-          return LoadUnchanged(scene_.views[static_cast<size_t>(camera)], options_.max_image_size);
-        },
-        ViewCacheBytes(cameras_, options_, settings_));
+    ViewCache views([&](CameraIndex camera) { return LoadUnchanged(camera, options_.max_image_size); },
+                    ViewCacheBytes(cameras_, options_, settings_));
     const CameraJobInputMaker inputs(scene_, cameras_, views, *blobs_, options_.job.lattice_step);
     JobRunner runner({.scene = scene_,
                       .inputs = inputs,
@@ -284,8 +281,9 @@ class LocalReconstruction {
   }
 
   // What was digested for the work folder and what is used must be the same.
-  absl::StatusOr<View> LoadUnchanged(const SceneView& scene_view, int max_image_size) const {
-    const auto index = static_cast<size_t>(&scene_view - scene_.views.data());
+  absl::StatusOr<View> LoadUnchanged(CameraIndex camera, int max_image_size) const {
+    const auto index = static_cast<size_t>(camera);
+    const SceneView& scene_view = scene_.views[index];
     absl::StatusOr<View> view = LoadView(scene_view, max_image_size);
     if (StampOf(scene_view.image_path) == stamps_[index]) return view;
     return BadInput(absl::FailedPreconditionError(

@@ -77,9 +77,8 @@ class Refinement {
       longest_ = std::max({longest_, camera.width, camera.height});
     }
     // Neighbours are each other's targets, mostly; twice what one reference needs.
-    views_.emplace(
-        [this](CameraIndex camera) { return environment_.load(scene_.views[static_cast<size_t>(camera)], size_); },
-        2 * (kTargets + 1) * largest);
+    views_.emplace([this](CameraIndex camera) { return environment_.load(camera, size_); },
+                   2 * (kTargets + 1) * largest);
   }
 
   absl::StatusOr<CameraRefinement> Run() {
@@ -100,8 +99,9 @@ class Refinement {
         MW_ASSIGN_OR_RETURN(
             ties, FindTies(cameras, level, (first_level - level) / (first_level + 1.0), 1 / (first_level + 1.0)));
         if (ties.held_out.size() < kMinHeldOut) break;
-        std::vector<Camera> moved = AdjustBundle(Halved(cameras, level), ties.used, {}, pool_);
-        const double before = MedianError(ties.held_out, Halved(cameras, level), pool_);
+        const std::vector<Camera> halved = Halved(cameras, level);
+        const std::vector<Camera> moved = AdjustBundle(halved, ties.used, {}, pool_);
+        const double before = MedianError(ties.held_out, halved, pool_);
         const double after = MedianError(ties.held_out, moved, pool_);
         if (!(after < kEnough * before)) break;
         for (size_t i = 0; i < cameras.size(); ++i) cameras[i].cam_from_world = moved[i].cam_from_world;

@@ -7,6 +7,7 @@
 
 #include "pipeline/options/reconstruction_options.h"
 
+#include "common/base/ids.h"
 #include "common/base/thread_pool.h"
 #include "common/job/camera_refinement.h"
 #include "common/scene/scene.h"
@@ -16,7 +17,7 @@ namespace meshwright {
 
 struct RefinementEnvironment {
   // A view of the scene, ready for use. Its errors are RefineCameras'.
-  std::function<absl::StatusOr<View>(const SceneView& view, int max_image_size)> load;
+  std::function<absl::StatusOr<View>(CameraIndex camera, int max_image_size)> load;
   ThreadPool* pool = nullptr;
   // How much is done, in [0, 1]; false: stop.
   std::function<bool(double done)> progress;

@@ -31,15 +31,14 @@ class Refiner {
   explicit Refiner(int threads) : pool_(threads) {}
 
   absl::StatusOr<CameraRefinement> Refine(const SyntheticScene& synthetic, const ReconstructionOptions& options = {}) {
-    // Photographs that are in memory only: what to load is the photograph of this name.
-    const auto load = [&](const SceneView& view, int max_image_size) -> absl::StatusOr<View> {
+    // Photographs that are in memory only.
+    const auto load = [&](CameraIndex camera, int max_image_size) -> absl::StatusOr<View> {
       ++loaded_;
-      for (size_t i = 0; i < synthetic.scene.views.size(); ++i) {
-        if (synthetic.scene.views[i].name != view.name) continue;
-        if (fails_) return absl::InvalidArgumentError("cannot be read");
-        return View{.camera = UndistortedCamera(view, max_image_size), .color = synthetic.images[i], .ignored = {}};
-      }
-      return absl::NotFoundError(view.name);
+      if (fails_) return absl::InvalidArgumentError("cannot be read");
+      const auto index = static_cast<size_t>(camera);
+      return View{.camera = UndistortedCamera(synthetic.scene.views[index], max_image_size),
+                  .color = synthetic.images[index],
+                  .ignored = {}};
     };
     const auto progress = [&](double done) {
       EXPECT_GE(done, done_);

@@ -13,8 +13,8 @@ CameraRefiner MakeCameraRefiner() {
   return [](const Scene& scene, const std::string& options_json, BlobStore& blobs, ThreadPool& pool,
             const std::function<bool(double)>& progress) -> absl::StatusOr<CameraRefinement> {
     MW_ASSIGN_OR_RETURN(const ReconstructionOptions options, ParseOptions(options_json));
-    const auto load = [&](const SceneView& view, int max_image_size) {
-      return LoadViewFromBlobs(view, max_image_size, blobs);
+    const auto load = [&](CameraIndex camera, int max_image_size) {
+      return LoadViewFromBlobs(scene.views[static_cast<size_t>(camera)], max_image_size, blobs);
     };
     return RefineCameras(scene, options, {.load = load, .pool = &pool, .progress = progress});
   };
