@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -16,6 +17,7 @@
 #include "common/base/status_macros.h"
 #include "coordinator/incidence/target_selection.h"
 #include "worker/job_input/view_cache.h"
+#include "worker/photo_consistency/halved_view.h"
 #include "worker/seeding/seeding.h"
 #include "worker/tie_points/tie_points.h"
 #include "worker/visibility/accepted_depth.h"
@@ -28,9 +30,10 @@ constexpr int kLatticeStep = 3;   // px, of seeds
 constexpr int kCells = 18;        // tie points of a reference are spread over so many cells in both directions
 constexpr int kWindowRadius = 5;  // px; a point's place is measured on more than its depth
 constexpr int kLevels = 3;
-constexpr int kSmallest = 120;  // px, longest side
-constexpr int kMaxPasses = 4;   // on photographs of one size
-constexpr size_t kHeldOut = 4;  // one of so many points has no say
+constexpr int kSmallest = 120;     // px, longest side
+constexpr int kSmallestSide = 16;  // px; no SamplingImage has smaller levels
+constexpr int kMaxPasses = 4;      // on photographs of one size
+constexpr size_t kHeldOut = 4;     // one of so many points has no say
 constexpr size_t kMinHeldOut = 50;
 // What errors must fall to: less gain is by chance.
 constexpr double kEnough = 0.95;
@@ -45,18 +48,6 @@ std::vector<Camera> Halved(std::vector<Camera> cameras, int times) {
     }
   }
   return cameras;
-}
-
-std::shared_ptr<const SamplingImage> Halved(const std::shared_ptr<const SamplingImage>& image, int times) {
-  if (times == 0) return image;
-  const int level_number = std::min(times, image->level_count() - 1);
-  const SamplingImage::Level& level = image->level(level_number);
-  GreyImage grey{level.width, level.height, {}};
-  grey.grey.reserve(level.quads.size());
-  for (const uint32_t quad : level.quads) grey.grey.push_back(static_cast<uint8_t>(quad & 0xFFU));
-  IgnoredPixels ignored = image->ignored();
-  for (int i = 0; i < level_number; ++i) ignored = ignored.Halved();
-  return std::make_shared<SamplingImage>(grey, image->level_count() - level_number, std::move(ignored));
 }
 
 // Tie points: those that move the cameras, and those that judge it.
@@ -75,6 +66,7 @@ class Refinement {
     for (const Camera& camera : given_) {
       largest = std::max(largest, SamplingImageBytes(camera.width, camera.height));
       longest_ = std::max({longest_, camera.width, camera.height});
+      shortest_ = std::min({shortest_, camera.width, camera.height});
     }
     // Neighbours are each other's targets, mostly; twice what one reference needs.
     views_.emplace([this](CameraIndex camera) { return environment_.load(camera, size_); },
@@ -93,7 +85,9 @@ class Refinement {
     std::vector<Camera> cameras = given_;
     Ties ties;
     int first_level = kLevels - 1;
-    while (first_level > 0 && (longest_ >> first_level) < kSmallest) --first_level;
+    while (first_level > 0 && (longest_ >> first_level < kSmallest || shortest_ >> first_level < kSmallestSide)) {
+      --first_level;
+    }
     for (int level = first_level; level >= 0; --level) {
       for (int pass = 0; pass < kMaxPasses; ++pass) {
         MW_ASSIGN_OR_RETURN(
@@ -174,7 +168,10 @@ class Refinement {
   absl::StatusOr<std::vector<TiePoint>> TiePointsOf(size_t reference, const std::vector<Camera>& cameras, int level) {
     const auto view_of = [&](CameraIndex camera) -> absl::StatusOr<ScoredView> {
       MW_ASSIGN_OR_RETURN(const std::shared_ptr<const SamplingImage> grey, views_->Grey(camera));
-      return ScoredView{cameras[static_cast<size_t>(camera)], Halved(grey, level)};
+      // `cameras` are where the passes before have moved them.
+      ScoredView view = Halved(ScoredView{given_[static_cast<size_t>(camera)], grey}, level);
+      view.camera = cameras[static_cast<size_t>(camera)];
+      return view;
     };
     MW_ASSIGN_OR_RETURN(const ScoredView view, view_of(static_cast<CameraIndex>(reference)));
     std::vector<ScoredView> targets;
@@ -270,6 +267,7 @@ class Refinement {
   ThreadPool& pool_;
   int size_ = 0;  // px, longest side asked for
   int longest_ = 0;
+  int shortest_ = std::numeric_limits<int>::max();
   std::vector<Camera> given_;  // of photographs of size_
   std::optional<ViewCache> views_;
   std::vector<std::vector<CameraIndex>> targets_;

@@ -9,6 +9,7 @@
 #include "worker/filtering/filtering.h"
 #include "worker/filtering/refinement.h"
 #include "worker/growing/growing.h"
+#include "worker/photo_consistency/halved_view.h"
 #include "worker/seeding/seeding.h"
 
 namespace meshwright {
@@ -24,16 +25,8 @@ constexpr double kMoreCertain = 3;
 constexpr float kClosedDepth = 1e-6F;
 
 JobView Halved(const JobView& view) {
-  const SamplingImage::Level& level = view.grey->level(1);
-  GreyImage grey{level.width, level.height, {}};
-  grey.grey.reserve(level.quads.size());
-  for (const uint32_t quad : level.quads) grey.grey.push_back(static_cast<uint8_t>(quad & 0xFFU));
-  JobView half = view;
-  half.camera.width = level.width;
-  half.camera.height = level.height;
-  for (double* const length : {&half.camera.fx, &half.camera.fy, &half.camera.cx, &half.camera.cy}) *length /= 2;
-  half.grey = std::make_shared<SamplingImage>(grey, view.grey->level_count() - 1, view.grey->ignored().Halved());
-  return half;
+  const ScoredView half = Halved(ScoredView{view.camera, view.grey});
+  return {view.camera_index, half.camera, half.grey};
 }
 
 // A plane as the pixels of the photograph halved see it, and back: its slope is per pixel.
