@@ -3,6 +3,6 @@
 
 namespace meshwright {
 
-const int kMethodVersion = 8;
+const int kMethodVersion = 9;
 
 }  // namespace meshwright

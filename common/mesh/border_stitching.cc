@@ -650,7 +650,7 @@ std::vector<int32_t> BorderStitcher::CutSimpleLoop(int32_t first) {
 
 // Closes the loops that are left of a hole, each as a whole: rims that fold over in the hole's plane stop an advancing
 // front.
-void BorderStitcher::CloseLoops(absl::Span<const int32_t> corners) {
+void BorderStitcher::CloseLoops(absl::Span<const int32_t> corners, LoopFill fill) {
   std::vector<Eigen::Vector3d> positions;
   std::vector<Eigen::Vector3d> normals;
   absl::flat_hash_set<int32_t> given_up;
@@ -662,7 +662,7 @@ void BorderStitcher::CloseLoops(absl::Span<const int32_t> corners) {
       normals.clear();
       for (const int32_t corner : loop) {
         positions.push_back(Position(VertexOf(corner)));
-        normals.push_back(Normal(VertexOf(corner)));
+        if (fill == LoopFill::kByNormals) normals.push_back(Normal(VertexOf(corner)));
       }
       const auto vertex = [&](int32_t i) { return VertexOf(loop[static_cast<size_t>(i)]); };
       const std::vector<Face> triangles =
@@ -707,7 +707,7 @@ int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>&
       candidates.push_back(At(edge).open ? BestNow(edge, scope) : Candidate());
     }
     Advance(corners, scope, candidates, [](double) {});
-    if (corners.size() == rim.size()) CloseLoops(corners);  // it has no islands
+    if (corners.size() == rim.size()) CloseLoops(corners, LoopFill::kByNormals);  // it has no islands
     if (h % kHolesAtOnce == 0) {
       Release();
       found.corners.Release();
@@ -723,74 +723,6 @@ int64_t BorderStitcher::FillHoles(double max_width, const std::function<void()>&
     if (!is_closed(found.islands[i])) is_filled[h] = 0;
   }
   return std::ranges::count(is_filled, 1);
-}
-
-std::pair<int32_t, int32_t> BorderStitcher::PlaceFor(const Face& triangle) const {
-  for (size_t k = 0; k < 3; ++k) {
-    // A triangle runs along an open edge from its end to its start.
-    const int32_t b = triangle[k];
-    const int32_t a = triangle[(k + 1) % 3];
-    const int32_t c = triangle[(k + 2) % 3];
-    const Eigen::Vector3d normal = (Position(a) - Position(b)).cross(Position(c) - Position(b));
-    if (!(normal.dot(Normal(a) + Normal(b) + Normal(c)) > 0)) continue;  // it would fold over
-    for (int32_t edge = a; edge >= 0; edge = At(edge).sibling) {
-      if (!At(edge).open || VertexOf(At(edge).next) != b) continue;
-      for (int32_t corner = c; corner >= 0; corner = At(corner).sibling) {
-        if (!At(corner).open) continue;
-        const bool after = At(At(edge).next).next == corner;
-        const bool before = At(edge).previous == corner;
-        if (!MakesNewEdges(edge, corner)) continue;
-        // Which of several gaps it lies in is to be seen; a vertex with one has no choice, however its rim is turned.
-        const bool has_choice = open_at_vertex_[static_cast<size_t>(c)] > 1 && !after && !before;
-        if (!has_choice || FitsGaps(edge, corner, {})) return {edge, corner};
-      }
-    }
-  }
-  return {-1, -1};
-}
-
-int64_t BorderStitcher::SewOn(absl::Span<const Face> triangles) {
-  std::vector<std::pair<double, size_t>> by_size;
-  absl::flat_hash_map<std::pair<int32_t, int32_t>, std::vector<size_t>> at_edge;  // ranks, by undirected edges
-  for (size_t i = 0; i < triangles.size(); ++i) {
-    double longest = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      longest = std::max(longest, (Position(triangles[i][k]) - Position(triangles[i][(k + 1) % 3])).squaredNorm());
-    }
-    by_size.emplace_back(longest, i);
-  }
-  std::ranges::sort(by_size);
-  std::priority_queue<size_t, std::vector<size_t>, std::greater<>> ranks;
-  for (size_t rank = 0; rank < by_size.size(); ++rank) {
-    const Face& triangle = triangles[by_size[rank].second];
-    for (size_t k = 0; k < 3; ++k) {
-      at_edge[std::minmax(triangle[k], triangle[(k + 1) % 3])].push_back(rank);
-    }
-    ranks.push(rank);
-  }
-  std::vector<uint8_t> is_sewn(triangles.size(), 0);
-  std::vector<int32_t> changed;
-  int64_t count = 0;
-  while (!ranks.empty()) {
-    const size_t rank = ranks.top();
-    ranks.pop();
-    if (is_sewn[rank] != 0) continue;
-    const auto [edge, corner] = PlaceFor(triangles[by_size[rank].second]);
-    if (edge < 0) continue;
-    Apply(edge, corner, changed);
-    is_sewn[rank] = 1;
-    ++count;
-    // What lies along its edges may have its place now.
-    for (const int32_t open : changed) {
-      if (!At(open).open) continue;
-      const auto waiting = at_edge.find(std::minmax(VertexOf(open), VertexOf(At(open).next)));
-      if (waiting == at_edge.end()) continue;
-      for (const size_t other : waiting->second) {
-        if (is_sewn[other] == 0) ranks.push(other);
-      }
-    }
-  }
-  return count;
 }
 
 }  // namespace meshwright

@@ -64,11 +64,24 @@ class BorderStitcher {
   // Adds those of the triangles that can be sewn on one after the other, the smallest first. Returns how many.
   int64_t SewOn(absl::Span<const Face> triangles);
 
+  // Adds those of the triangles whose corners lie in gaps and whose edges are all new, the smallest first: they touch
+  // what is there in points, and leave slits around them. Returns how many.
+  int64_t PutIn(absl::Span<const Face> triangles);
+
+  // Closes loops of at most `max_width` times the vertices' spacing, however they are turned, by the least area: where
+  // rims cross each other a loop is a gap in one place and surface that lies on surface in the next. The outside of
+  // what is joined to nothing is no such loop. Where several gaps meet in a vertex they are told apart before by the
+  // order in which surface lies around it. Takes faces that touch others in points alone out of the game (faces_alone).
+  // Returns how many it has closed.
+  int64_t CloseSlits(double max_width);
+
   // Whether a gap starts at the vertex.
   bool IsOpen(int32_t v) const { return open_at_vertex_[static_cast<size_t>(v)] > 0; }
   absl::Span<const BorderVertex> vertices() const { return vertices_; }
   // The edge from its first to its second vertex was open when a face was put over it.
   absl::Span<const Face> faces() const { return absl::MakeConstSpan(faces_.data(), faces_.size()); }
+  // Of these, ascending, those that are to be left out.
+  absl::Span<const int32_t> faces_alone() const { return faces_alone_; }
   // The face that has an edge from `from` to `to`, or kNone: a part may have it.
   int32_t FaceAlong(int32_t from, int32_t to) const;
   // Those that have the vertex, ascending.
@@ -142,6 +155,7 @@ class BorderStitcher {
   bool FitsGaps(int32_t edge, int32_t corner, const Scope& scope) const;
   // Where the triangle can be sewn on now: an open edge of it and the corner opposite; {-1, -1}: nowhere.
   std::pair<int32_t, int32_t> PlaceFor(const Face& triangle) const;
+  std::vector<Face> SmallestFirst(absl::Span<const Face> triangles) const;
   bool InGap(int32_t corner, int32_t vertex, const Scope& scope) const;
   // Outwards at a vertex.
   Eigen::Vector3d NormalFor(int32_t v, const Scope& scope) const { return scope.normal ? *scope.normal : Normal(v); }
@@ -159,7 +173,16 @@ class BorderStitcher {
                    const Progress& stitching);
   Holes FindHoles(double max_width) const;
   std::vector<int32_t> CutSimpleLoop(int32_t first);
-  void CloseLoops(absl::Span<const int32_t> corners);
+  enum class LoopFill { kByNormals, kByArea };  // of TriangulateLoop
+  void CloseLoops(absl::Span<const int32_t> corners, LoopFill fill);
+  // Pairs the gaps' ends at a vertex anew, each with the next one around the vertex.
+  void SortGapsAround(int32_t v);
+  // So that no loop comes to a vertex twice.
+  void CutLoops();
+  // Whether nothing has been joined to the border that the loop runs along, and the part lies inside.
+  bool IsIsland(absl::Span<const int32_t> loop) const;
+  // The face that the loop runs around, if it is no more than that; else kNone.
+  int32_t FaceWithin(absl::Span<const int32_t> loop) const;
 
   Corner& At(int32_t corner) { return corners_[static_cast<size_t>(corner)]; }
   const Corner& At(int32_t corner) const { return corners_[static_cast<size_t>(corner)]; }
@@ -176,6 +199,7 @@ class BorderStitcher {
   SpooledVector<Corner> corners_;            // corner v is the first one of vertex v
   SpooledVector<int32_t> open_at_vertex_;    // how many of its corners are open
   SpooledVector<Face> faces_;
+  std::vector<int32_t> faces_alone_;
   // Corner k of face f is entry 3 f + k of a list of all that are at its vertex.
   static constexpr uint32_t kEnd = UINT32_MAX;
   SpooledVector<uint32_t> last_at_vertex_;

@@ -32,6 +32,8 @@ PlyAttributes AttributesWith(const Eigen::Vector3d& offset) {
 }
 // Seams are one or two steps wide; the circle through their corners is a little larger.
 constexpr double kStitchReach = 2;
+// Loops this wide are closed however they are turned, in the vertices' spacing.
+constexpr double kMaxSlitWidth = 20;
 // Offsets at a seam are averaged over this many vertices to either side, so that texture does not smear.
 constexpr int kSeamSmoothing = 8;
 // What is done before memory is given back.
@@ -156,7 +158,8 @@ std::vector<SeamOffset> SeamOffsets(const PartBorders& borders, const SpooledVec
 std::vector<int32_t> SplitPoints(const BorderStitcher& stitcher, SpooledVector<BorderStitcher::Face>& faces) {
   std::vector<int32_t> copies;
   for (const int32_t point : stitcher.VerticesWithSeveralGaps()) {
-    const std::vector<int32_t> around = stitcher.FacesAround(point);
+    std::vector<int32_t> around = stitcher.FacesAround(point);
+    std::erase_if(around, [&](int32_t f) { return std::ranges::binary_search(stitcher.faces_alone(), f); });
     // The last one stands for the fan in the part.
     std::vector<std::pair<int32_t, int32_t>> ends;  // the face's next corner and the one after that
     for (const int32_t f : around) {
@@ -187,6 +190,19 @@ std::vector<int32_t> SplitPoints(const BorderStitcher& stitcher, SpooledVector<B
     }
   }
   return copies;
+}
+
+// The rest moves up. `which` ascends.
+void LeaveOut(absl::Span<const int32_t> which, SpooledVector<BorderStitcher::Face>& faces) {
+  size_t end = 0;
+  for (size_t f = 0; f < faces.size(); ++f) {
+    if (!which.empty() && which.front() == static_cast<int32_t>(f)) {
+      which.remove_prefix(1);
+    } else {
+      faces[end++] = faces[f];
+    }
+  }
+  faces.Shorten(end);
 }
 
 void AppendVertex(const TriangleMesh& from, size_t vertex, TriangleMesh& to) {
@@ -230,15 +246,17 @@ void CollectEdges(const PartBorders& borders, Joins& joins) {
   std::sort(joins.edges.begin(), joins.edges.end());
 }
 
-// Sews them on, a block's worth after the other.
-int64_t SewOn(absl::Span<const BorderStitcher::Face> triangles, const JoinOptions& options, BorderStitcher& stitcher) {
+// Adds them one way or the other, a block's worth after the other.
+int64_t Add(absl::Span<const BorderStitcher::Face> triangles,
+            int64_t (BorderStitcher::*add)(absl::Span<const BorderStitcher::Face>), const JoinOptions& options,
+            BorderStitcher& stitcher) {
   const auto at_once = static_cast<size_t>(options.vertices_of_block);
-  int64_t sewn = 0;
+  int64_t added = 0;
   for (; !triangles.empty(); triangles.remove_prefix(std::min(at_once, triangles.size()))) {
-    sewn += stitcher.SewOn(triangles.subspan(0, at_once));
+    added += (stitcher.*add)(triangles.subspan(0, at_once));
     stitcher.Release();
   }
-  return sewn;
+  return added;
 }
 
 // Stitches all but the components that are small, and finds which are. Triangles to crumbs keep others from meeting:
@@ -263,7 +281,7 @@ BorderStitcher Stitched(const PartBorders& borders, const JoinOptions& options, 
       const auto component = static_cast<size_t>(borders.origins[static_cast<size_t>(v)].component);
       return small[component] != 0 || borders.faces_of_component[component] == 1;
     });
-    SewOn(absl::MakeConstSpan(stays.data(), stays.size()), options, stitcher);
+    Add(absl::MakeConstSpan(stays.data(), stays.size()), &BorderStitcher::SewOn, options, stitcher);
     stitcher.StitchNearby(kStitchReach, blocks, pool, step);
     step = [&] { borders.Release(); };
     int64_t removed = 0;
@@ -298,19 +316,25 @@ absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions&
   if (options.close_reach > 0) {
     MW_ASSIGN_OR_RETURN(const std::vector<BorderStitcher::Face> triangles,
                         FindGapTriangles(borders, stitcher, joins.small, options.close_reach, load, pool, progress));
-    counts.closing_faces = SewOn(triangles, options, stitcher);
+    counts.closing_faces = Add(triangles, &BorderStitcher::SewOn, options, stitcher) +
+                           Add(triangles, &BorderStitcher::PutIn, options, stitcher);
     // What it has left open is small now.
     counts.holes_filled += stitcher.FillHoles(options.max_hole_steps, [] {});
   }
+  counts.holes_filled += stitcher.CloseSlits(std::min(options.max_hole_steps, kMaxSlitWidth));
   counts.border_edges_after = stitcher.CountOpenEdges();
   counts.stitch_faces = static_cast<int64_t>(stitch_faces);
-  counts.hole_faces = static_cast<int64_t>(stitcher.faces().size() - stitch_faces) - counts.closing_faces;
+  const auto alone = static_cast<int64_t>(stitcher.faces_alone().size());
+  counts.closing_faces -= alone;
+  counts.hole_faces = static_cast<int64_t>(stitcher.faces().size() - stitch_faces) - alone - counts.closing_faces;
   joins.differences = SeamDifferences(borders, stitcher.faces().subspan(0, stitch_faces));
   const auto position = [&](int32_t v) { return stitcher.vertices()[static_cast<size_t>(v)].position; };
+  const auto area = [&](const BorderStitcher::Face& face) {
+    return TriangleArea(position(face[0]), position(face[1]), position(face[2]));
+  };
   for (size_t f = 0; f < stitcher.faces().size(); ++f) {
-    const BorderStitcher::Face& face = stitcher.faces()[f];
-    counts.area += TriangleArea(position(face[0]), position(face[1]), position(face[2]));
-    joins.faces.push_back(face);
+    counts.area += area(stitcher.faces()[f]);
+    joins.faces.push_back(stitcher.faces()[f]);
     if (f % kFacesAtOnce == 0) {
       borders.Release();
       stitcher.Release();
@@ -318,6 +342,8 @@ absl::StatusOr<Joins> JoinBorders(const PartBorders& borders, const JoinOptions&
     }
   }
   joins.copies = SplitPoints(stitcher, joins.faces);
+  for (const int32_t f : stitcher.faces_alone()) counts.area -= area(stitcher.faces()[static_cast<size_t>(f)]);
+  LeaveOut(stitcher.faces_alone(), joins.faces);
   if (options.simplify_footprints > 0) CollectEdges(borders, joins);
   return joins;
 }

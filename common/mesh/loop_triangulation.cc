@@ -71,7 +71,9 @@ class LoopTriangulation {
     const double length = cross.norm();
     if (!(length > 0)) return {kNever, kNever};
     double cosine = 1;
-    for (const int32_t i : {a, b, c}) cosine = std::min(cosine, cross.dot(at(normals_, i)) / length);
+    if (!normals_.empty()) {
+      for (const int32_t i : {a, b, c}) cosine = std::min(cosine, cross.dot(at(normals_, i)) / length);
+    }
     return {1 - cosine, 0.5 * length};
   }
 
@@ -96,7 +98,7 @@ class LoopTriangulation {
 std::vector<std::array<int32_t, 3>> TriangulateLoop(absl::Span<const Eigen::Vector3d> loop,
                                                     absl::Span<const Eigen::Vector3d> normals,
                                                     const std::function<bool(int32_t, int32_t)>& may_join) {
-  MW_CHECK(loop.size() >= 3 && normals.size() == loop.size());
+  MW_CHECK(loop.size() >= 3 && (normals.empty() || normals.size() == loop.size()));
   return LoopTriangulation(loop, normals, may_join).Run();
 }
 

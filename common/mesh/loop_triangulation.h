@@ -18,7 +18,7 @@ namespace meshwright {
 // that are no neighbours in the loop are only joined where `may_join` says so, and no triangle is without area.
 //
 // `normals` look outwards, the loop runs clockwise around the hole as seen from there; corners of triangles are indices
-// into the loop, counter-clockwise.
+// into the loop, counter-clockwise. Without normals area alone decides, however the loop is turned.
 std::vector<std::array<int32_t, 3>> TriangulateLoop(absl::Span<const Eigen::Vector3d> loop,
                                                     absl::Span<const Eigen::Vector3d> normals,
                                                     const std::function<bool(int32_t, int32_t)>& may_join);

@@ -81,6 +81,29 @@ TEST(TriangulateLoop, ItsWorstTriangleIsTheBestOfAll) {
   }
 }
 
+double AreaOf(const Loop& loop, const std::vector<Triangle>& triangles) {
+  double area = 0;
+  for (const Triangle& t : triangles) {
+    const auto at = [&](size_t k) { return loop.positions[static_cast<size_t>(t[k])]; };
+    area += 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
+  }
+  return area;
+}
+
+TEST(TriangulateLoop, WithoutNormalsItIsTheSmallestOfAllHoweverItIsTurned) {
+  std::mt19937 random(4);
+  for (int trial = 0; trial < 40; ++trial) {
+    const int corners = 3 + trial % 6;
+    Loop loop = NoisyLoop(corners, 0.8, random);
+    if (trial % 2 == 1) std::ranges::reverse(loop.positions);
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& triangles : AllTriangulations(0, corners - 1)) {
+      least = std::min(least, AreaOf(loop, triangles));
+    }
+    EXPECT_NEAR(AreaOf(loop, TriangulateLoop(loop.positions, {}, kAnyJoin)), least, 1e-12);
+  }
+}
+
 // Each edge of the loop has one triangle, which runs against it; each edge within two, in opposite directions.
 TEST(TriangulateLoop, ClosesTheLoop) {
   std::mt19937 random(3);
