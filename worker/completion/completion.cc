@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <optional>
 #include <vector>
 
@@ -20,8 +21,9 @@ namespace {
 constexpr int kRowsPerPiece = 4;
 
 constexpr int kDirections = LatticeSight::kDirections;
-// So many of them must meet the plane.
+// So many of them must meet the plane; where the picture ends it could go on, but not in most of them.
 constexpr int kMinOnPlane = 10;
+constexpr int kMinOnPlaneAtRim = 6;
 // Three directions that are at least so many apart span a plane well.
 constexpr int kMinApart = 4;
 // What lies on the plane, in lattice steps d_r.
@@ -33,6 +35,8 @@ constexpr float kContinuedWithin = 3;
 constexpr int kBehindRim = 4;
 // A window with more contrast, grey levels, was not blind: what it was compared with did not agree.
 constexpr float kMaxTexture = 2;
+// What rays around have inferred is averaged this far around, lattice steps.
+constexpr int kSmoothingRadius = 5;
 
 class Completer {
  public:
@@ -61,12 +65,18 @@ class Completer {
     if (!window.may_hold_surface || window.may_show_backdrop || window.sigma > kMaxTexture) return std::nullopt;
     std::array<Hit, kDirections> hits;
     int count = 0;
+    int leave_picture = 0;
     for (int direction = 0; direction < kDirections; ++direction) {
       hits[static_cast<size_t>(direction)] = Look(column, row, direction);
-      if (hits[static_cast<size_t>(direction)].w > 0) ++count;
+      if (hits[static_cast<size_t>(direction)].w > 0) {
+        ++count;
+      } else if (LeavesPicture(column, row, direction)) {
+        ++leave_picture;
+      }
     }
-    if (count < kMinOnPlane) return std::nullopt;
-    const std::optional<PatchPlane> plane = PlaneOfMost(hits);
+    const int min_on_plane = std::max(kMinOnPlane - leave_picture, kMinOnPlaneAtRim);
+    if (count < min_on_plane) return std::nullopt;
+    const std::optional<PatchPlane> plane = PlaneOfMost(hits, min_on_plane);
     if (!plane.has_value()) return std::nullopt;
     const std::optional<PatchPlane> fit = Fit(column, row, hits, *plane);
     if (!fit.has_value() || fit->w < window.min_w || fit->w > window.max_w) return std::nullopt;
@@ -126,10 +136,18 @@ class Completer {
             around_w_[static_cast<size_t>(lattice_.Index(column + steps * dx, row + steps * dy))]};
   }
 
-  // The plane through three of the hits that most of them lie on; of equals the one they are closest to.
-  std::optional<PatchPlane> PlaneOfMost(const std::array<Hit, kDirections>& hits) const {
+  // Whether the picture ends within reach.
+  bool LeavesPicture(int column, int row, int direction) const {
+    const auto& [dx, dy] = LatticeSight::kStep[static_cast<size_t>(direction)];
+    const int steps = reach_ / std::max(std::abs(dx), std::abs(dy));
+    return !lattice_.Contains(column + steps * dx, row + steps * dy);
+  }
+
+  // The plane through three of the hits that most of them lie on, at least `min_on_plane`; of equals the one they are
+  // closest to.
+  std::optional<PatchPlane> PlaneOfMost(const std::array<Hit, kDirections>& hits, int min_on_plane) const {
     std::optional<PatchPlane> best;
-    int most = kMinOnPlane - 1;
+    int most = min_on_plane - 1;
     float least_error = 0;
     for (const auto& [ia, ib, ic] : triples_) {
       const Hit& a = hits[static_cast<size_t>(ia)];
@@ -198,6 +216,33 @@ class Completer {
   std::vector<std::array<int, 3>> triples_;
 };
 
+// Each ray meets other rims, so their planes differ where they are one. Planes in the place of inferred patches, for
+// `row`: the mean of those around that agree.
+void SmoothRow(const std::vector<PatchPlane>& inferred, const Lattice& lattice, float footprint, int row,
+               std::vector<PatchPlane>& smooth) {
+  for (int column = 0; column < lattice.columns; ++column) {
+    const auto node = static_cast<size_t>(lattice.Index(column, row));
+    const PatchPlane& own = inferred[node];
+    if (!(own.w > 0)) continue;
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    float count = 0;
+    for (int dy = -kSmoothingRadius; dy <= kSmoothingRadius; ++dy) {
+      for (int dx = -kSmoothingRadius; dx <= kSmoothingRadius; ++dx) {
+        if (!lattice.Contains(column + dx, row + dy)) continue;
+        const PatchPlane& other = inferred[static_cast<size_t>(lattice.Index(column + dx, row + dy))];
+        if (!(other.w > 0)) continue;
+        const PatchPlane here =
+            other.MovedBy(static_cast<float>(-dx * lattice.step), static_cast<float>(-dy * lattice.step));
+        if (std::fabs(here.w - own.w) > 2 * kTolerance * footprint * own.w) continue;
+        sum += Eigen::Vector3f(here.w, here.gx, here.gy);
+        ++count;
+      }
+    }
+    sum /= count;
+    smooth[node] = {sum[0], sum[1], sum[2]};
+  }
+}
+
 // Links inferred patches with each other and with what surrounds them, where one continues the other.
 void LinkInferred(const std::vector<uint8_t>& is_inferred, float footprint, SurfaceEstimate& surface) {
   constexpr float kMaxPlaneDistance = 2;  // d_r
@@ -234,27 +279,34 @@ int64_t CompleteSurface(const PatchScorer& scorer, const AcceptedDepth& accepted
   MW_CHECK(accepted.depth.size() == surface.plane.size());
   MW_CHECK(found.size() == surface.plane.size());
   const Completer completer(scorer, accepted, options, surface);
+  const float footprint = static_cast<float>(lattice.step) / static_cast<float>(scorer.reference().focal());
+  const auto over_rows = [&](const auto& body) {
+    pool.ParallelFor(lattice.rows, kRowsPerPiece, [&](int64_t begin, int64_t end) {
+      for (auto row = static_cast<int>(begin); row < end; ++row) body(row);
+    });
+  };
   std::vector<PatchPlane> inferred(surface.plane.size());
-  pool.ParallelFor(lattice.rows, kRowsPerPiece, [&](int64_t begin, int64_t end) {
-    for (auto row = static_cast<int>(begin); row < end; ++row) {
+  if (options.max_reach > 0) {
+    std::vector<PatchPlane> rough(surface.plane.size());
+    over_rows([&](int row) {
       for (int column = 0; column < lattice.columns; ++column) {
         const auto node = static_cast<size_t>(lattice.Index(column, row));
-        if (surface.plane[node].w > 0 || accepted.depth[node] > 0) continue;
-        inferred[node] = found[node];
-        if (inferred[node].w > 0 || options.max_reach == 0) continue;
-        inferred[node] = completer.PlaneAround(column, row).value_or(PatchPlane{});
+        if (surface.plane[node].w > 0 || accepted.depth[node] > 0 || found[node].w > 0) continue;
+        rough[node] = completer.PlaneAround(column, row).value_or(PatchPlane{});
       }
-    }
-  });
+    });
+    over_rows([&](int row) { SmoothRow(rough, lattice, footprint, row, inferred); });
+  }
   std::vector<uint8_t> is_inferred(inferred.size(), 0);
   int64_t count = 0;
   for (size_t node = 0; node < inferred.size(); ++node) {
+    if (!(surface.plane[node].w > 0) && !(accepted.depth[node] > 0) && found[node].w > 0) inferred[node] = found[node];
     if (!(inferred[node].w > 0)) continue;
     surface.plane[node] = inferred[node];
     is_inferred[node] = 1;
     ++count;
   }
-  LinkInferred(is_inferred, static_cast<float>(lattice.step) / static_cast<float>(scorer.reference().focal()), surface);
+  LinkInferred(is_inferred, footprint, surface);
   return count;
 }
 

@@ -111,6 +111,34 @@ TEST_F(CompleteSurfaceTest, NothingIsExtendedBeyondARim) {
   EXPECT_EQ(Complete(), 0);
 }
 
+TEST_F(CompleteSurfaceTest, WhereThePictureEndsThePlaneGoesOn) {
+  Punch(25, 35, 50, lattice_.rows);
+  const int64_t hole = 25 * (lattice_.rows - 35);
+  EXPECT_GT(Complete(), hole * 9 / 10);
+  for (int row = 35; row < lattice_.rows; ++row) {
+    for (int column = 25; column < 50; ++column) {
+      if (!HasPatch(column, row)) continue;
+      EXPECT_LT(OffWall(column, row), 0.5F) << column << ", " << row;
+    }
+  }
+}
+
+TEST_F(CompleteSurfaceTest, InferredSurfaceIsSmoothHoweverRoughItsRim) {
+  std::mt19937 random(7);
+  std::normal_distribution<float> noise(0, 0.4F);
+  for (PatchPlane& plane : surface_.plane) plane.w *= 1 + noise(random) * kStep / kFocal;
+  Punch(25, 20, 50, 40);
+  Complete();
+  float bends = 0;  // of the noise's unit, d_r
+  for (int row = 20; row < 40; ++row) {
+    for (int column = 26; column + 1 < 50; ++column) {
+      const auto w = [&](int c) { return surface_.plane[static_cast<size_t>(lattice_.Index(c, row))].w; };
+      bends += std::fabs(w(column - 1) - 2 * w(column) + w(column + 1)) / w(column) * kFocal / kStep;
+    }
+  }
+  EXPECT_LT(bends / (20 * 23), 0.04F);
+}
+
 TEST_F(CompleteSurfaceTest, WhatIsAroundMustBeOnePlane) {
   // A pit whose rim is a staircase, each stair 5 d_r behind the one before.
   for (int row = 0; row < lattice_.rows; ++row) {
