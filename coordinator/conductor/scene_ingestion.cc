@@ -29,6 +29,8 @@ namespace fs = std::filesystem;
 
 constexpr char kFileScheme[] = "file:";
 constexpr int64_t kMaxEntries = 1'000'000;
+// Photographs that are put into the blob store at a time: each waits for a disk and a database. So many are in memory.
+constexpr int kPutAtOnce = 4;
 
 bool IsBelow(const fs::path& path, const fs::path& root) {
   auto at = path.begin();
@@ -103,19 +105,35 @@ absl::StatusOr<fs::path> RealRoot(const std::string& root) {
   return real_root;
 }
 
+absl::Status PutPhotographsOf(ReferencedBlobs& blobs, SceneView& view) {
+  MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(view.image_path));
+  MW_ASSIGN_OR_RETURN(view.image_path, blobs.Put(bytes));
+  if (view.mask_path.empty()) return absl::OkStatus();
+  MW_ASSIGN_OR_RETURN(const std::string mask, ReadFile(view.mask_path));
+  MW_ASSIGN_OR_RETURN(view.mask_path, blobs.Put(mask));
+  return absl::OkStatus();
+}
+
+// Paths become digests.
+absl::Status PutPhotographs(ReferencedBlobs& blobs, Scene& scene) {
+  std::vector<absl::Status> put(scene.views.size());
+  ThreadPool waiting(kPutAtOnce);
+  waiting.ParallelFor(static_cast<int64_t>(scene.views.size()), 1, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      put[i] = PutPhotographsOf(blobs, scene.views[i]);
+    }
+  });
+  for (const absl::Status& status : put) MW_RETURN_IF_ERROR(status);
+  return absl::OkStatus();
+}
+
 absl::StatusOr<IngestedScene> IngestConfined(Scene scene, const std::string& root, ReferencedBlobs& blobs,
                                              ThreadPool& pool) {
   MW_ASSIGN_OR_RETURN(const fs::path real_root, RealRoot(root));
   MW_RETURN_IF_ERROR(CheckPhotographs(scene, real_root));
   IngestedScene taken;
   MW_ASSIGN_OR_RETURN(taken.scene_digest, CheckAndDigestScene(scene, pool, [](int) {}));
-  for (SceneView& view : scene.views) {
-    MW_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(view.image_path));
-    MW_ASSIGN_OR_RETURN(view.image_path, blobs.Put(bytes));
-    if (view.mask_path.empty()) continue;
-    MW_ASSIGN_OR_RETURN(const std::string mask, ReadFile(view.mask_path));
-    MW_ASSIGN_OR_RETURN(view.mask_path, blobs.Put(mask));
-  }
+  MW_RETURN_IF_ERROR(PutPhotographs(blobs, scene));
   MW_ASSIGN_OR_RETURN(taken.scene_blob, blobs.Put(EncodeScene(scene)));
   return taken;
 }
