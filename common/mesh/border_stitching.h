@@ -64,8 +64,8 @@ class BorderStitcher {
   // Adds those of the triangles that can be sewn on one after the other, the smallest first. Returns how many.
   int64_t SewOn(absl::Span<const Face> triangles);
 
-  // Adds those of the triangles whose corners lie in gaps and whose edges are all new, the smallest first: they touch
-  // what is there in points, and leave slits around them. Returns how many.
+  // Adds those of the triangles whose corners lie in gaps and whose edges are all new, the smallest first, but for
+  // slivers: they touch what is there in points, and leave slits around them. Returns how many.
   int64_t PutIn(absl::Span<const Face> triangles);
 
   // Closes loops of at most `max_width` times the vertices' spacing, however they are turned, by the least area: where

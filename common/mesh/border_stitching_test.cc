@@ -153,6 +153,15 @@ TEST(BorderStitcher, TrianglesThatTouchGapsInPointsLeaveSlitsThatAreClosed) {
   EXPECT_DOUBLE_EQ(area, 16);
 }
 
+TEST(BorderStitcher, HairsAreNotPutIn) {
+  std::vector<BorderVertex> rim = SquareHole();
+  rim[2].position.x() += 0.1F;
+  BorderStitcher stitcher(rim, {});
+  EXPECT_EQ(stitcher.PutIn({{{0, 2, 4}}}), 0);
+  rim[2].position.x() += 1;
+  EXPECT_EQ(BorderStitcher(rim, {}).PutIn({{{0, 2, 4}}}), 1);
+}
+
 // A rim whose one half is a gap, while the other's sides have changed places: surface lies on surface there.
 TEST(BorderStitcher, LoopsThatCrossThemselvesAreClosed) {
   std::vector<BorderVertex> rim;

@@ -17,6 +17,8 @@ namespace {
 
 // Larger loops are left alone: time grows with the third power of the corners.
 constexpr size_t kMaxSlitCorners = 60;
+// Of a triangle that touches what is there in points, beside its longest edge: no rays say anything against a hair.
+constexpr double kMinHeight = 0.1;
 
 }  // namespace
 
@@ -103,6 +105,10 @@ int64_t BorderStitcher::PutIn(absl::Span<const Face> triangles) {
     if (HasEdge(a, b) || HasEdge(b, c) || HasEdge(c, a)) continue;
     const Eigen::Vector3d normal = (Position(b) - Position(a)).cross(Position(c) - Position(a));
     if (!(normal.dot(Normal(a) + Normal(b) + Normal(c)) > 0)) continue;  // it would fold over
+    const double longest =
+        std::max({(Position(b) - Position(a)).squaredNorm(), (Position(c) - Position(b)).squaredNorm(),
+                  (Position(a) - Position(c)).squaredNorm()});
+    if (normal.norm() < kMinHeight * longest) continue;
     const auto first = static_cast<int32_t>(corners_.size());
     for (int32_t k = 0; k < 3; ++k) {
       const int32_t v = triangle[static_cast<size_t>(k)];
