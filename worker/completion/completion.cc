@@ -24,6 +24,8 @@ constexpr int kDirections = LatticeSight::kDirections;
 // So many of them must meet the plane; where the picture ends it could go on, but not in most of them.
 constexpr int kMinOnPlane = 10;
 constexpr int kMinOnPlaneAtRim = 6;
+// Nor may so many side by side miss it: sky ends with the picture too, and has its roofs on one side.
+constexpr int kMaxMissingSideBySide = 5;
 // Three directions that are at least so many apart span a plane well.
 constexpr int kMinApart = 4;
 // What lies on the plane, in lattice steps d_r.
@@ -77,7 +79,7 @@ class Completer {
     const int min_on_plane = std::max(kMinOnPlane - leave_picture, kMinOnPlaneAtRim);
     if (count < min_on_plane) return std::nullopt;
     const std::optional<PatchPlane> plane = PlaneOfMost(hits, min_on_plane);
-    if (!plane.has_value()) return std::nullopt;
+    if (!plane.has_value() || !Surrounds(*plane, hits)) return std::nullopt;
     const std::optional<PatchPlane> fit = Fit(column, row, hits, *plane);
     if (!fit.has_value() || fit->w < window.min_w || fit->w > window.max_w) return std::nullopt;
     return fit;
@@ -175,6 +177,17 @@ class Completer {
       }
     }
     return best;
+  }
+
+  // Whether the plane is met on all sides.
+  bool Surrounds(const PatchPlane& plane, const std::array<Hit, kDirections>& hits) const {
+    int missing = 0;
+    for (int direction = 0; direction < 2 * kDirections; ++direction) {
+      const Hit& hit = hits[static_cast<size_t>(direction % kDirections)];
+      missing = hit.w > 0 && IsOn(plane, hit.dx, hit.dy, hit.w) ? 0 : missing + 1;
+      if (missing > kMaxMissingSideBySide) return false;
+    }
+    return true;
   }
 
   // The least-squares plane through the hits that lie on `plane` and what lies behind them; the nearer, the more

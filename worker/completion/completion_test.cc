@@ -114,13 +114,19 @@ TEST_F(CompleteSurfaceTest, NothingIsExtendedBeyondARim) {
 TEST_F(CompleteSurfaceTest, WhereThePictureEndsThePlaneGoesOn) {
   Punch(25, 35, 50, lattice_.rows);
   const int64_t hole = 25 * (lattice_.rows - 35);
-  EXPECT_GT(Complete(), hole * 9 / 10);
+  EXPECT_GT(Complete(), hole * 2 / 3);
   for (int row = 35; row < lattice_.rows; ++row) {
     for (int column = 25; column < 50; ++column) {
       if (!HasPatch(column, row)) continue;
       EXPECT_LT(OffWall(column, row), 0.5F) << column << ", " << row;
     }
   }
+}
+
+TEST_F(CompleteSurfaceTest, SkyAboveARoofIsNoWallThatThePictureCuts) {
+  // It rises to the left.
+  for (int row = 0; row < 20; ++row) Punch(20 + row, row, lattice_.columns, row + 1);
+  EXPECT_EQ(Complete(), 0);
 }
 
 TEST_F(CompleteSurfaceTest, InferredSurfaceIsSmoothHoweverRoughItsRim) {
