@@ -529,10 +529,10 @@ bool WorkerService::IsAlive(const WorkerRecord& worker) const {
 }
 
 bool WorkerService::HasWorkerWithColmap(int64_t method_version) const {
-  return std::any_of(workers_.begin(), workers_.end(), [&](const auto& entry) {
-    const WorkerRecord& worker = entry.second;
-    return IsAlive(worker) && worker.method_version == method_version && !worker.colmap_version.empty();
-  });
+  for (const auto& [id, worker] : workers_) {
+    if (IsAlive(worker) && worker.method_version == method_version && !worker.colmap_version.empty()) return true;
+  }
+  return false;
 }
 
 int WorkerService::LeasesIn(const std::string& reconstruction) const {
