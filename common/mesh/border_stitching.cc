@@ -212,6 +212,14 @@ std::vector<int32_t> BorderStitcher::VerticesWithSeveralGaps() const {
   return found;
 }
 
+std::vector<int32_t> BorderStitcher::VerticesThatHadSeveralGaps() const {
+  std::vector<int32_t> found;
+  for (size_t v = 0; v < vertices_.size(); ++v) {
+    if (corners_[v].sibling >= 0) found.push_back(static_cast<int32_t>(v));
+  }
+  return found;
+}
+
 void BorderStitcher::Drop(const std::function<bool(int32_t)>& is_dropped) {
   for (Corner& corner : corners_) {
     if (corner.open && is_dropped(corner.vertex)) Close(corner);

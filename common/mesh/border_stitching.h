@@ -91,8 +91,10 @@ class BorderStitcher {
   int32_t PreviousInPart(int32_t v) const { return previous_in_part_[static_cast<size_t>(v)]; }
   // Gives memory back until it is asked for again.
   void Release() const;
-  // Vertices that several gaps meet, ascending, with how many.
+  // Vertices that several gaps meet, ascending.
   std::vector<int32_t> VerticesWithSeveralGaps() const;
+  // Those that several gaps have met, ascending: closed or not, what lies between them may touch in the vertex alone.
+  std::vector<int32_t> VerticesThatHadSeveralGaps() const;
 
  private:
   // One gap at a vertex: the open edge that comes in and the one that goes out. A vertex may have several. The open

@@ -152,12 +152,12 @@ std::vector<SeamOffset> SeamOffsets(const PartBorders& borders, const SpooledVec
   return offsets;
 }
 
-// A vertex at which several gaps meet would join fans of triangles in a point only. Each fan but the one that lies in
+// A vertex at which several gaps met may join fans of triangles in a point only. Each fan but the one that lies in
 // its part gets a copy of the vertex in `faces`, which are the stitcher's, numbered behind its vertices. Returns what
 // is copied.
 std::vector<int32_t> SplitPoints(const BorderStitcher& stitcher, SpooledVector<BorderStitcher::Face>& faces) {
   std::vector<int32_t> copies;
-  for (const int32_t point : stitcher.VerticesWithSeveralGaps()) {
+  for (const int32_t point : stitcher.VerticesThatHadSeveralGaps()) {
     std::vector<int32_t> around = stitcher.FacesAround(point);
     std::erase_if(around, [&](int32_t f) { return std::ranges::binary_search(stitcher.faces_alone(), f); });
     // The last one stands for the fan in the part.

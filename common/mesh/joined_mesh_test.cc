@@ -119,6 +119,29 @@ std::shared_ptr<const SparseSurface> Sparse(const PatchLattice& surface) {
 
 bool Everywhere(double, double) { return true; }
 
+// Closed or not, the triangles at a vertex are one fan.
+void ExpectOneFanAtEachVertex(const TriangleMesh& mesh) {
+  std::vector<std::map<uint32_t, uint32_t>> around(mesh.positions.size());  // from corner to corner, past a triangle
+  for (const auto& face : mesh.faces) {
+    for (size_t k = 0; k < 3; ++k) around[face[k]].emplace(face[(k + 1) % 3], face[(k + 2) % 3]);
+  }
+  for (size_t v = 0; v < around.size(); ++v) {
+    if (around[v].empty()) continue;
+    std::set<uint32_t> ends;
+    for (const auto& [from, to] : around[v]) ends.insert(to);
+    uint32_t first = around[v].begin()->first;
+    for (const auto& [from, to] : around[v]) {
+      if (!ends.contains(from)) first = from;
+    }
+    size_t passed = 0;
+    for (auto at = around[v].find(first); at != around[v].end(); at = around[v].find(at->second)) {
+      ++passed;
+      if (at->second == first) break;
+    }
+    EXPECT_EQ(passed, around[v].size()) << "fans meet in vertex " << v;
+  }
+}
+
 // The directed edges that have no partner, as a map from start to end. Checks that edges and faces are as promised.
 std::map<uint32_t, uint32_t> BorderOf(const TriangleMesh& mesh) {
   std::set<std::pair<uint32_t, uint32_t>> edges;
@@ -131,6 +154,7 @@ std::map<uint32_t, uint32_t> BorderOf(const TriangleMesh& mesh) {
       EXPECT_TRUE(edges.emplace(face[k], face[(k + 1) % 3]).second) << "an edge is there twice in one direction";
     }
   }
+  ExpectOneFanAtEachVertex(mesh);
   std::map<uint32_t, uint32_t> border;
   for (const auto& [from, to] : edges) {
     if (edges.contains({to, from})) continue;
