@@ -204,14 +204,6 @@ int64_t BorderStitcher::CountOpenEdges() const {
   return std::ranges::count_if(corners_, [](const Corner& corner) { return corner.open; });
 }
 
-std::vector<int32_t> BorderStitcher::VerticesWithSeveralGaps() const {
-  std::vector<int32_t> found;
-  for (size_t v = 0; v < vertices_.size(); ++v) {
-    if (open_at_vertex_[v] > 1) found.push_back(static_cast<int32_t>(v));
-  }
-  return found;
-}
-
 std::vector<int32_t> BorderStitcher::VerticesThatHadSeveralGaps() const {
   std::vector<int32_t> found;
   for (size_t v = 0; v < vertices_.size(); ++v) {

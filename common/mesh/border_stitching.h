@@ -91,9 +91,8 @@ class BorderStitcher {
   int32_t PreviousInPart(int32_t v) const { return previous_in_part_[static_cast<size_t>(v)]; }
   // Gives memory back until it is asked for again.
   void Release() const;
-  // Vertices that several gaps meet, ascending.
-  std::vector<int32_t> VerticesWithSeveralGaps() const;
-  // Those that several gaps have met, ascending: closed or not, what lies between them may touch in the vertex alone.
+  // Vertices that several gaps have met, ascending: closed or not, what lies between them may touch in the vertex
+  // alone.
   std::vector<int32_t> VerticesThatHadSeveralGaps() const;
 
  private:
@@ -157,6 +156,8 @@ class BorderStitcher {
   bool FitsGaps(int32_t edge, int32_t corner, const Scope& scope) const;
   // Where the triangle can be sewn on now: an open edge of it and the corner opposite; {-1, -1}: nowhere.
   std::pair<int32_t, int32_t> PlaceFor(const Face& triangle) const;
+  // Of the longest edge.
+  double SquaredLength(const Face& triangle) const;
   std::vector<Face> SmallestFirst(absl::Span<const Face> triangles) const;
   bool InGap(int32_t corner, int32_t vertex, const Scope& scope) const;
   // Outwards at a vertex.

@@ -58,6 +58,10 @@ TEST(BorderStitcher, HolesInNoiseAreClosed) {
   EXPECT_EQ(static_cast<size_t>(stitcher.CountOpenEdges()), vertices.size() - rims);
 }
 
+void CloseRim(std::vector<BorderVertex>& rim) {
+  for (size_t v = 0; v < rim.size(); ++v) rim[v].next = static_cast<int32_t>((v + 1) % rim.size());
+}
+
 // A square hole of 4 x 4 in the plane, its corners and its rim at whole numbers.
 std::vector<BorderVertex> SquareHole() {
   std::vector<BorderVertex> vertices;
@@ -69,8 +73,18 @@ std::vector<BorderVertex> SquareHole() {
   for (int x = 0; x < 4; ++x) add(static_cast<float>(x), 4);
   for (int y = 4; y > 0; --y) add(4, static_cast<float>(y));
   for (int x = 4; x > 0; --x) add(static_cast<float>(x), 0);
-  for (size_t v = 0; v < vertices.size(); ++v) vertices[v].next = static_cast<int32_t>((v + 1) % vertices.size());
+  CloseRim(vertices);
   return vertices;
+}
+
+// As seen from +z; what faces away counts against it.
+double AreaFromAbove(const BorderStitcher& stitcher) {
+  double area = 0;
+  for (const auto& [a, b, c] : stitcher.faces()) {
+    const auto at = [&](int32_t v) { return stitcher.vertices()[static_cast<size_t>(v)].position; };
+    area += 0.5 * static_cast<double>((at(b) - at(a)).cross(at(c) - at(a)).z());
+  }
+  return area;
 }
 
 // Around corner 0, counter-clockwise.
@@ -89,12 +103,7 @@ TEST(BorderStitcher, TrianglesAreSewnOnInWhateverOrderTheyCome) {
     std::ranges::shuffle(fan, random);
     BorderStitcher stitcher(rim, {});
     EXPECT_EQ(stitcher.SewOn(fan), 8);
-    double area = 0;
-    for (const auto& [a, b, c] : stitcher.faces()) {
-      const auto at = [&](int32_t v) { return rim[static_cast<size_t>(v)].position; };
-      area += 0.5 * static_cast<double>((at(b) - at(a)).cross(at(c) - at(a)).z());
-    }
-    EXPECT_DOUBLE_EQ(area, 16);
+    EXPECT_DOUBLE_EQ(AreaFromAbove(stitcher), 16);
   }
 }
 
@@ -145,12 +154,7 @@ TEST(BorderStitcher, TrianglesThatTouchGapsInPointsLeaveSlitsThatAreClosed) {
   EXPECT_EQ(stitcher.CloseSlits(20), 3);
   EXPECT_EQ(stitcher.CountOpenEdges(), 0);
   ExpectManifold(stitcher);
-  double area = 0;
-  for (const auto& [a, b, c] : stitcher.faces()) {
-    const auto at = [&](int32_t v) { return rim[static_cast<size_t>(v)].position; };
-    area += 0.5 * static_cast<double>((at(b) - at(a)).cross(at(c) - at(a)).z());
-  }
-  EXPECT_DOUBLE_EQ(area, 16);
+  EXPECT_DOUBLE_EQ(AreaFromAbove(stitcher), 16);
 }
 
 TEST(BorderStitcher, HairsAreNotPutIn) {
@@ -169,7 +173,7 @@ TEST(BorderStitcher, LoopsThatCrossThemselvesAreClosed) {
        {std::pair(0.F, 0.F), {0.F, 1.F}, {1.F, 1.F}, {3.F, -1.F}, {4.F, -1.F}, {4.F, 1.F}, {3.F, 1.F}, {1.F, 0.F}}) {
     rim.push_back({.position = {x, y, 0}, .normal = {0, 0, 1}, .spacing = 1});
   }
-  for (size_t v = 0; v < rim.size(); ++v) rim[v].next = static_cast<int32_t>((v + 1) % rim.size());
+  CloseRim(rim);
   BorderStitcher stitcher(rim, {});
   EXPECT_EQ(stitcher.FillHoles(30, [] {}), 0);
   // The larger half makes the part's inside out of it, were nothing joined to it.
@@ -183,7 +187,7 @@ TEST(BorderStitcher, LoopsThatCrossThemselvesAreClosed) {
 TEST(BorderStitcher, TheOutsideOfAPieceIsNoSlit) {
   std::vector<BorderVertex> outside = SquareHole();
   std::ranges::reverse(outside);
-  for (size_t v = 0; v < outside.size(); ++v) outside[v].next = static_cast<int32_t>((v + 1) % outside.size());
+  CloseRim(outside);
   BorderStitcher stitcher(outside, {});
   EXPECT_EQ(stitcher.CloseSlits(20), 0);
   EXPECT_EQ(stitcher.CountOpenEdges(), 16);

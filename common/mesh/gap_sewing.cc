@@ -46,15 +46,17 @@ std::pair<int32_t, int32_t> BorderStitcher::PlaceFor(const Face& triangle) const
   return {-1, -1};
 }
 
+double BorderStitcher::SquaredLength(const Face& triangle) const {
+  double longest = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    longest = std::max(longest, (Position(triangle[k]) - Position(triangle[(k + 1) % 3])).squaredNorm());
+  }
+  return longest;
+}
+
 std::vector<BorderStitcher::Face> BorderStitcher::SmallestFirst(absl::Span<const Face> triangles) const {
   std::vector<std::pair<double, size_t>> by_size;
-  for (size_t i = 0; i < triangles.size(); ++i) {
-    double longest = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      longest = std::max(longest, (Position(triangles[i][k]) - Position(triangles[i][(k + 1) % 3])).squaredNorm());
-    }
-    by_size.emplace_back(longest, i);
-  }
+  for (size_t i = 0; i < triangles.size(); ++i) by_size.emplace_back(SquaredLength(triangles[i]), i);
   std::ranges::sort(by_size);
   std::vector<Face> sorted;
   for (const auto& [longest, i] : by_size) sorted.push_back(triangles[i]);
@@ -105,10 +107,7 @@ int64_t BorderStitcher::PutIn(absl::Span<const Face> triangles) {
     if (HasEdge(a, b) || HasEdge(b, c) || HasEdge(c, a)) continue;
     const Eigen::Vector3d normal = (Position(b) - Position(a)).cross(Position(c) - Position(a));
     if (!(normal.dot(Normal(a) + Normal(b) + Normal(c)) > 0)) continue;  // it would fold over
-    const double longest =
-        std::max({(Position(b) - Position(a)).squaredNorm(), (Position(c) - Position(b)).squaredNorm(),
-                  (Position(a) - Position(c)).squaredNorm()});
-    if (normal.norm() < kMinHeight * longest) continue;
+    if (normal.norm() < kMinHeight * SquaredLength(triangle)) continue;
     const auto first = static_cast<int32_t>(corners_.size());
     for (int32_t k = 0; k < 3; ++k) {
       const int32_t v = triangle[static_cast<size_t>(k)];
@@ -222,7 +221,7 @@ int32_t BorderStitcher::FaceWithin(absl::Span<const int32_t> loop) const {
 }
 
 int64_t BorderStitcher::CloseSlits(double max_width) {
-  for (const int32_t v : VerticesWithSeveralGaps()) SortGapsAround(v);
+  for (const int32_t v : VerticesThatHadSeveralGaps()) SortGapsAround(v);
   CutLoops();
   Release();
   SpooledVector<uint8_t> seen(spool_beside_);
