@@ -77,9 +77,7 @@ absl::StatusOr<std::unique_ptr<ReconstructionService>> ReconstructionService::Op
   }
   auto service = std::unique_ptr<ReconstructionService>(new ReconstructionService(options, environment, workers));
   workers.SetListener([raw = service.get()](const std::string& id) {
-    const MutexLock lock(raw->mutex_);
-    const auto found = raw->conducted_.find(id);
-    if (found != raw->conducted_.end()) found->second->Wake();
+    if (!raw->WakeConductor(id)) raw->options_.tell_others({StoreNews::About::kResults, id});
   });
   service->overseer_ = std::thread([raw = service.get()] { raw->Oversee(); });
   return service;
@@ -107,6 +105,27 @@ void ReconstructionService::Changed(bool look) {
   }
   changed_.NotifyAll();
   if (look) overseer_wake_.NotifyAll();
+}
+
+bool ReconstructionService::WakeConductor(const std::string& id) {
+  const MutexLock lock(mutex_);
+  const auto found = conducted_.find(id);
+  if (found == conducted_.end()) return false;
+  found->second->Wake();
+  return true;
+}
+
+void ReconstructionService::Hear(const StoreNews& news) {
+  const bool is_all = news.about == StoreNews::About::kAll;
+  if (is_all || news.about == StoreNews::About::kJobs) workers_.Wake();
+  if (is_all || news.about == StoreNews::About::kStates) {
+    workers_.Wake();
+    Changed(/*look=*/true);
+  }
+  if (news.about == StoreNews::About::kResults) WakeConductor(news.reconstruction);
+  if (!is_all) return;
+  const MutexLock lock(mutex_);
+  for (auto& [id, conducted] : conducted_) conducted->Wake();
 }
 
 void ReconstructionService::Oversee() {
@@ -206,6 +225,7 @@ void ReconstructionService::StopConducting(const std::string& id) {
   }
   workers_.Wake();
   Changed(/*look=*/true);
+  options_.tell_others({StoreNews::About::kStates, id});
 }
 
 void ReconstructionService::TellEnd(const std::string& id) {
@@ -341,6 +361,7 @@ absl::StatusOr<v1::Reconstruction> ReconstructionService::Start(const std::strin
     MW_ASSIGN_OR_RETURN(const absl::Time now, environment_.store->Now());
     MW_RETURN_IF_ERROR(environment_.store->RequestState(id, ReconstructionState::kPreparing, now));
     Changed(/*look=*/true);
+    options_.tell_others({StoreNews::About::kStates, id});
     MW_ASSIGN_OR_RETURN(stored, Find(id));
   }
   if (stored.state == ReconstructionState::kCancelled) return WrongState(stored, "one not cancelled");

@@ -20,6 +20,7 @@
 #include "coordinator/api/scene_upload.h"
 #include "coordinator/conductor/reconstruction_driver.h"
 #include "coordinator/dispatch/worker_service.h"
+#include "coordinator/store/store_news.h"
 
 namespace meshwright {
 
@@ -36,6 +37,8 @@ struct ReconstructionServiceOptions {
   // Told of each reconstruction that has come to its end here, once; not of one whose end this process did not live to
   // see. Must not block.
   std::function<void(const v1::Reconstruction&)> ended = [](const v1::Reconstruction&) {};
+  // For the other coordinators that share the store. Must not block.
+  std::function<void(const StoreNews&)> tell_others = [](const StoreNews&) {};
 };
 
 // The public interface without a network. All that it knows is in the JobStore and the BlobStore, so any coordinator
@@ -90,6 +93,8 @@ class ReconstructionService {
   // which is asked every half second, gives true, or Shutdown().
   absl::Status Watch(const std::string& id, const std::function<bool()>& cancelled,
                      const std::function<bool(const v1::Reconstruction&)>& send);
+  // What another coordinator tells.
+  void Hear(const StoreNews& news);
   // Ends all Watch().
   void Shutdown();
 
@@ -100,6 +105,7 @@ class ReconstructionService {
   absl::StatusOr<Reconstruction> Find(const std::string& id) const;
   v1::Reconstruction Describe(const Reconstruction& reconstruction) const;
   absl::Status CheckTakesFiles(const std::string& id) const;
+  bool WakeConductor(const std::string& id);  // false: it is none of this coordinator's
   void StopConducting(const std::string& id);
   void TellEnd(const std::string& id);
   void Changed(bool look);

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <set>
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
@@ -91,22 +92,30 @@ class ReconstructionServiceTest : public testing::Test {
     workers_.reset();
     store_.reset();
     store_ = *OpenSqliteJobStore(folder_ + "/state.sqlite");
-    const RetryOptions retry = {.backoff = absl::Milliseconds(1)};
-    workers_ = std::make_unique<WorkerService>(
-        LeaseOptions{.lease = absl::Seconds(30), .job_time_limit = absl::Hours(1)}, retry, *store_);
+    workers_ = std::make_unique<WorkerService>(kLease, kRetry, *store_);
+    service_ = OpenService({.data_folder = folder_ + "/data",
+                            .scene_roots = {folder_ + "/roots"},
+                            .method_version = method_version},
+                           *workers_);
+  }
+  std::unique_ptr<ReconstructionService> OpenService(const ReconstructionServiceOptions& options,
+                                                     WorkerService& workers) {
     auto opened = ReconstructionService::Open(
-        {.data_folder = folder_ + "/data", .scene_roots = {folder_ + "/roots"}, .method_version = method_version},
+        options,
         {.store = store_.get(),
          .blobs = blobs_.get(),
          .clock = &clock_,
          .pool = &pool_,
-         .jobs_changed = [this] { workers_->Wake(); },
+         .jobs_changed = [&workers, tell = options.tell_others] {
+           workers.Wake();
+           tell({StoreNews::About::kJobs, ""});
+         },
          .parse_config = ParseTestMethod,
          .list_photographs = [](const std::string&) { return std::vector<PhotographFile>(); },
-         .max_failures = retry.max_failures},
-        *workers_);
+         .max_failures = kRetry.max_failures},
+        workers);
     MW_CHECK(opened.ok());
-    service_ = *std::move(opened);
+    return *std::move(opened);
   }
 
   void CreateAndStart(const std::string& id) {
@@ -182,6 +191,9 @@ class ReconstructionServiceTest : public testing::Test {
     return last;
   }
   std::string Mesh(const std::string& id) { return *ReadFile(*service_->MeshPath(id)); }
+
+  static inline const LeaseOptions kLease = {.lease = absl::Seconds(30), .job_time_limit = absl::Hours(1)};
+  static inline const RetryOptions kRetry = {.backoff = absl::Milliseconds(1)};
 
   std::string folder_;
   RealClock clock_;
@@ -337,6 +349,52 @@ TEST_F(ReconstructionServiceTest, AnotherTakesOverWhateverTheClockSays) {
   ASSERT_TRUE(service_->Start("wall").ok());
   RunWorker("w", 1000, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
   EXPECT_EQ(WaitFor("wall").state(), v1::RECONSTRUCTION_STATE_DONE);
+}
+
+// North conducts, and south, which has not the method, has the workers: each hears of the other what there is to do.
+TEST_F(ReconstructionServiceTest, CoordinatorsTellEachOther) {
+  Mutex mutex;
+  std::set<StoreNews> told_by_north;
+  std::set<StoreNews> told_by_south;
+  WorkerService north_workers(kLease, kRetry, *store_);
+  std::unique_ptr<ReconstructionService> north;
+  service_.reset();
+  service_ = OpenService({.data_folder = folder_ + "/data",
+                          .scene_roots = {folder_ + "/roots"},
+                          .name = "south",
+                          .method_version = kMethodVersion + 1,
+                          .tell_others =
+                              [&](const StoreNews& news) {
+                                const MutexLock lock(mutex);
+                                told_by_south.insert(news);
+                                if (north != nullptr) north->Hear(news);
+                              }},
+                         *workers_);
+  {
+    const MutexLock lock(mutex);
+    north = OpenService({.data_folder = folder_ + "/north",
+                         .scene_roots = {folder_ + "/roots"},
+                         .name = "north",
+                         .tell_others =
+                             [&](const StoreNews& news) {
+                               const MutexLock lock(mutex);
+                               told_by_north.insert(news);
+                               service_->Hear(news);
+                             }},
+                        north_workers);
+  }
+  v1::CreateReconstructionRequest request;
+  request.set_id("wall");
+  request.set_scene_reference("file:wall");
+  ASSERT_TRUE(north->Create(request).ok());
+  ASSERT_TRUE(service_->Start("wall").ok());
+  RunWorker("ant", 1000, [&](const v1::CameraJob& job, v1::HeldJob& held) { Finish(job, held); });
+  EXPECT_EQ(WaitFor("wall").state(), v1::RECONSTRUCTION_STATE_DONE);
+  north.reset();
+  service_.reset();
+  EXPECT_THAT(told_by_south, testing::ElementsAre(StoreNews{StoreNews::About::kResults, "wall"},
+                                                  StoreNews{StoreNews::About::kStates, "wall"}));
+  EXPECT_THAT(told_by_north, testing::ElementsAre(StoreNews{StoreNews::About::kJobs, ""}));
 }
 
 TEST_F(ReconstructionServiceTest, ACoordinatorThatIsStartedAnewGoesOn) {

@@ -33,8 +33,8 @@ namespace fs = std::filesystem;
 // Errors of the store and the blobs (a full disk, a server that is away) are waited out for some minutes.
 constexpr int kMaxFailures = 12;
 constexpr std::chrono::seconds kRetryDelay(10);
-// Results that other coordinators took are noticed by looking again.
-constexpr std::chrono::milliseconds kPollInterval(250);
+// Results that other coordinators took are told; what was told and not heard is found by looking again.
+constexpr std::chrono::seconds kLookAgain(2);
 constexpr int kMaxRepairsInARow = 100;
 
 // How often it is told how far the mesh is, which the store is written for.
@@ -115,7 +115,7 @@ void ReconstructionDriver::Wake() {
 
 bool ReconstructionDriver::WaitForNews() {
   MutexLock lock(mutex_);
-  if (!stopping_ && !has_news_) wake_.WaitFor(lock, kPollInterval);
+  if (!stopping_ && !has_news_) wake_.WaitFor(lock, kLookAgain);
   has_news_ = false;
   return !stopping_;
 }

@@ -28,9 +28,9 @@ constexpr int kMaxHeldJobs = 2 * kMaxCores;
 constexpr size_t kMaxWorkers = 10'000;
 constexpr size_t kMaxCalls = 2 * kMaxWorkers;
 constexpr double kMaxWaitTimeoutSeconds = 60;
-// Other coordinators, and backoffs that end, are noticed by looking again: often while a worker waits.
-constexpr std::chrono::milliseconds kPoll(100);
-constexpr std::chrono::milliseconds kPollIdle(1000);
+// Leases that run out, and what another coordinator told and was not heard, are found by looking again.
+constexpr std::chrono::milliseconds kLookAgain(1000);
+constexpr std::chrono::milliseconds kAskWhetherCancelled(100);
 constexpr std::chrono::milliseconds kAfterFailure(200);
 // Workers are shown for a while after they were heard of last.
 constexpr int kLeasesUntilForgotten = 10;
@@ -210,7 +210,7 @@ absl::StatusOr<v1::SynchronizeResponse> WorkerService::Synchronize(const v1::Syn
   const int64_t call = Synchronize(request, [promise](absl::StatusOr<v1::SynchronizeResponse> response) {
     promise->set_value(std::move(response));
   });
-  while (answer.wait_for(kPoll) != std::future_status::ready) {
+  while (answer.wait_for(kAskWhetherCancelled) != std::future_status::ready) {
     if (cancelled()) Abandon(call);
   }
   return answer.get();
@@ -219,10 +219,9 @@ absl::StatusOr<v1::SynchronizeResponse> WorkerService::Synchronize(const v1::Syn
 void WorkerService::Run() {
   MutexLock lock(mutex_);
   while (true) {
-    const auto look_again =
-        calls_.empty() ? std::min(kPollIdle, std::chrono::milliseconds(absl::ToInt64Milliseconds(lease_.lease / 5)))
-                       : kPoll;
-    auto until = SteadyClock::now() + look_again;
+    auto until = SteadyClock::now() +
+                 std::min(kLookAgain, std::chrono::milliseconds(absl::ToInt64Milliseconds(lease_.lease / 5)));
+    if (!calls_.empty()) until = std::min(until, next_pause_ends_);
     for (const Call& call : calls_) until = std::min(until, call.deadline);
     while (!awake_ && !stopping_ && SteadyClock::now() < until) wake_.WaitFor(lock, until - SteadyClock::now());
     awake_ = false;
@@ -305,6 +304,8 @@ absl::Status WorkerService::MakePass(std::list<Call>& calls) {
   }
   Tell(applied.news);
   Publish(pass, now);
+  next_pause_ends_ =
+      SteadyClock::now() + absl::ToChronoNanoseconds(std::min(pass.UntilNextPauseEnds(), retry_.max_backoff));
 
   for (auto call = calls.begin(); call != calls.end();) {
     call->is_heard = true;

@@ -122,6 +122,7 @@ class WorkerService {
   std::map<std::string, Background> backgrounds_;
   std::map<std::string, WorkerRecord> written_workers_;
   absl::Time last_pass_ = absl::InfinitePast();
+  std::chrono::steady_clock::time_point next_pause_ends_ = std::chrono::steady_clock::time_point::max();  // of a job
   absl::Time last_look_at_workers_ = absl::InfinitePast();
 
   mutable Mutex mutex_;

@@ -38,6 +38,7 @@
 #include "coordinator/nodeodm/nodeodm_server.h"
 #include "coordinator/rest/rest_server.h"
 #include "coordinator/store/job_store.h"
+#include "coordinator/store/store_news.h"
 #include "coordinator/telemetry/cluster_gauges.h"
 #include "coordinator/telemetry/measured_sql_database.h"
 #include "coordinator/telemetry/rpc_metrics.h"
@@ -85,7 +86,10 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
                .job_time_limit = absl::Seconds(settings.job_time_limit_seconds)},
         pool_(settings.threads) {}
 
-  ~RealCoordinatorProgram() override { Shutdown(absl::Seconds(1)); }
+  ~RealCoordinatorProgram() override {
+    Shutdown(absl::Seconds(1));
+    if (news_ != nullptr) news_->SetListener(nullptr);
+  }
 
   absl::Status Open() {
     MW_RETURN_IF_ERROR(lease_.Validate());
@@ -111,13 +115,18 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
     MW_ASSIGN_OR_RETURN(unmeasured_blobs_,
                         OpenBlobStore(settings_.blobs.empty() ? absl::StrCat(data, "/blobs") : settings_.blobs));
     blobs_ = std::make_unique<MeasuredBlobStore>(*unmeasured_blobs_, metrics_);
+    news_ = OpenStoreNews(where);
     MW_RETURN_IF_ERROR(OpenWebhook());
     workers_ = std::make_unique<WorkerService>(lease_, retry_, *store_);
     const DriverEnvironment environment = {.store = store_.get(),
                                            .blobs = blobs_.get(),
                                            .clock = &clock_,
                                            .pool = &pool_,
-                                           .jobs_changed = [this] { workers_->Wake(); },
+                                           .jobs_changed =
+                                               [this] {
+                                                 workers_->Wake();
+                                                 TellOthers({StoreNews::About::kJobs, ""});
+                                               },
                                            .parse_config = ParseConfig,
                                            .list_photographs = ListPhotographFiles,
                                            .make_verdict =
@@ -130,8 +139,10 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
                                                .scene_roots = settings_.scene_roots,
                                                .name = NameOf(data),
                                                .conductor_lease = std::min(lease_.lease, kConductorLease),
-                                               .ended = [this](const v1::Reconstruction& over) { TellEnd(over); }},
+                                               .ended = [this](const v1::Reconstruction& over) { TellEnd(over); },
+                                               .tell_others = [this](const StoreNews& news) { TellOthers(news); }},
                                               environment, *workers_));
+    if (news_ != nullptr) news_->SetListener([this](const StoreNews& news) { reconstructions_->Hear(news); });
     MW_ASSIGN_OR_RETURN(gate_, OpenGate(settings_, *store_, clock_, log_, metrics_));
     GrpcServer::Interceptors interceptors;
     interceptors.push_back(MakeRpcMetrics(metrics_));
@@ -171,6 +182,10 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
     return absl::OkStatus();
   }
 
+  void TellOthers(const StoreNews& news) {
+    if (news_ != nullptr) news_->Tell(news);
+  }
+
   void TellEnd(const v1::Reconstruction& over) {
     if (webhook_ != nullptr) webhook_->Send(WebhookBody(over));
   }
@@ -192,7 +207,8 @@ class RealCoordinatorProgram final : public CoordinatorProgram {
   ThreadPool pool_;
   std::unique_ptr<FolderLock> data_lock_;
   std::unique_ptr<JobStore> store_;
-  SqlDatabase* database_ = nullptr;  // the store's
+  SqlDatabase* database_ = nullptr;         // the store's
+  std::unique_ptr<StoreNewsChannel> news_;  // null: nobody else has the store
   std::unique_ptr<BlobStore> unmeasured_blobs_;
   std::unique_ptr<BlobStore> blobs_;
   std::unique_ptr<WebhookSender> webhook_;  // null: none

@@ -5,6 +5,7 @@
 
 #include "common/base/status_macros.h"
 #include "coordinator/store/postgres_job_store.h"
+#include "coordinator/store/postgres_news.h"
 #include "coordinator/store/sqlite_job_store.h"
 
 namespace meshwright {
@@ -32,6 +33,10 @@ absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where,
     return OpenSqliteJobStore(where.substr(sizeof(kSqliteScheme) - 1), nullptr, wrap);
   }
   return OpenPostgresJobStore(where, {}, wrap);
+}
+
+std::unique_ptr<StoreNewsChannel> OpenStoreNews(const std::string& where) {
+  return IsPostgres(where) ? OpenPostgresNews(where) : nullptr;
 }
 
 }  // namespace meshwright

@@ -8,6 +8,7 @@
 
 #include "coordinator/store/job_store.h"
 #include "coordinator/store/sql_database.h"
+#include "coordinator/store/store_news.h"
 
 namespace meshwright {
 
@@ -16,5 +17,8 @@ namespace meshwright {
 absl::Status CheckJobStore(const std::string& where);
 
 absl::StatusOr<std::unique_ptr<JobStore>> OpenJobStore(const std::string& where, const WrapSqlDatabase& wrap = nullptr);
+
+// Null where one program alone has the store.
+std::unique_ptr<StoreNewsChannel> OpenStoreNews(const std::string& where);
 
 }  // namespace meshwright

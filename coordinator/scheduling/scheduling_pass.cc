@@ -277,6 +277,18 @@ std::vector<const OpenJob*> SchedulingPass::HeldBy(const std::string& worker, co
   return held;
 }
 
+absl::Duration SchedulingPass::UntilNextPauseEnds() const {
+  absl::Duration first = absl::InfiniteDuration();
+  for (size_t i = 0; i < jobs_.size(); ++i) {
+    if (!jobs_[i].lease_worker.empty() || jobs_[i].not_before <= now_) continue;
+    first = std::min(first, jobs_[i].not_before - now_);
+  }
+  for (const Change& decided : changes_) {
+    if (decided.change.retry_at > now_) first = std::min(first, decided.change.retry_at - now_);
+  }
+  return first;
+}
+
 int SchedulingPass::LeasesIn(const std::string& reconstruction) const {
   const auto found = shares_.find(reconstruction);
   return found == shares_.end() ? 0 : found->second.leases;

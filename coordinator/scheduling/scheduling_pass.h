@@ -64,6 +64,8 @@ class SchedulingPass {
   // Jobs of the worker's process, by reconstruction and sequence.
   std::vector<const OpenJob*> HeldBy(const std::string& worker, const std::string& instance) const;
   int LeasesIn(const std::string& reconstruction) const;
+  // Until the first of the jobs that wait, with a pause after a failure, can be granted; infinite: there is none.
+  absl::Duration UntilNextPauseEnds() const;
 
  private:
   JobChange LossOf(const OpenJob& job, const std::string& reason, bool out_of_memory) const;

@@ -722,6 +722,27 @@ TEST_P(JobStoreConformance, CommitsAndChoicesAdvanceTogether) {
   EXPECT_EQ(store().GetReconstruction("castle")->progress, progress);
 }
 
+// More in both directions than a connection holds back: who only sends, or only reads, waits forever.
+TEST_P(JobStoreConformance, LargeTransactionsGoThrough) {
+  constexpr int kJobs = 300;
+  std::vector<CameraAssignment> choices;
+  std::vector<JobChange> claims;
+  for (int s = 1; s <= kJobs; ++s) {
+    choices.push_back({.sequence = s, .camera = s, .spec = std::string(20'000, static_cast<char>('a' + s % 26))});
+    claims.push_back(ChangeOf(JobChange::Kind::kClaim, s, 1, std::string(20'000, 'w')));
+  }
+  ASSERT_TRUE(store().Advance("castle", {}, choices, {}, kNow, Conduct("castle")).ok());
+  const auto results = store().ApplyChanges(claims, {}, kNow);
+  ASSERT_TRUE(results.ok()) << results.status();
+  ASSERT_EQ(results->size(), kJobs);
+  for (int s = 1; s <= kJobs; ++s) {
+    const JobChangeResult& result = (*results)[static_cast<size_t>(s) - 1];
+    ASSERT_TRUE(result.status.ok()) << result.status;
+    EXPECT_EQ(result.job->sequence, s);
+    EXPECT_EQ(result.job->spec, choices[static_cast<size_t>(s) - 1].spec);
+  }
+}
+
 // The life of a reconstruction.
 
 TEST_P(JobStoreConformance, AReconstructionRunsOnceItsSceneIsThere) {

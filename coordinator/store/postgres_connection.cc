@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <cstdlib>
 #include <utility>
 
@@ -46,6 +47,24 @@ PostgresError Classify(const std::string& code, const std::string& message) {
   if (StartsWith(code, "XX001") || StartsWith(code, "XX002")) return final_error(absl::DataLossError(message));
   if (code == "57014") return final_error(absl::UnavailableError(message));
   return final_error(absl::InternalError(absl::StrCat(message, " (SQLSTATE ", code, ")")));
+}
+
+const SqlValue& ValueOf(const PostgresCall& call, const std::string& name) {
+  const auto given = std::find_if(call.parameters->begin(), call.parameters->end(),
+                                  [&](const auto& parameter) { return parameter.first == name; });
+  MW_CHECK(given != call.parameters->end());
+  return given->second;
+}
+
+// libpq would silently end a text at a zero byte.
+PostgresError CheckTexts(const PostgresCall& call) {
+  for (const auto& [name, value] : *call.parameters) {
+    const auto* const text = std::get_if<std::string>(&value);
+    if (text == nullptr || text->find('\0') == std::string::npos) continue;
+    return {PostgresFault::kFinal,
+            absl::InvalidArgumentError(absl::StrCat(name, " has a zero byte, expected text"))};
+  }
+  return {};
 }
 
 }  // namespace
@@ -127,7 +146,8 @@ PostgresError PostgresConnection::Open(const std::string& url, const std::string
 }
 
 bool PostgresConnection::IsReusable() const {
-  return PQstatus(connection_) == CONNECTION_OK && PQtransactionStatus(connection_) == PQTRANS_IDLE;
+  return PQstatus(connection_) == CONNECTION_OK && PQtransactionStatus(connection_) == PQTRANS_IDLE &&
+         PQpipelineStatus(connection_) == PQ_PIPELINE_OFF;
 }
 
 PostgresError PostgresConnection::ConnectionError(const std::string& what) {
@@ -145,14 +165,19 @@ PostgresError PostgresConnection::ResultError(const pg_result* result) {
   return Classify(code, absl::StrCat(description_, ": ", primary == nullptr ? "unknown error" : primary));
 }
 
+bool PostgresConnection::WaitForSocket(int16_t events, absl::Duration deadline) {
+  const absl::Duration left = deadline - SystemClock().Uptime();
+  if (left <= absl::ZeroDuration()) return false;
+  pollfd socket = {.fd = PQsocket(connection_), .events = events, .revents = 0};
+  const int ready = ::poll(&socket, 1, static_cast<int>(absl::ToInt64Milliseconds(left)) + 1);
+  if (ready < 0) return errno == EINTR;
+  const bool has_input = ready > 0 && (socket.revents & ~POLLOUT) != 0;
+  return !has_input || PQconsumeInput(connection_) != 0;
+}
+
 bool PostgresConnection::WaitForInput(absl::Duration deadline) {
   while (PQisBusy(connection_) != 0) {
-    const absl::Duration left = deadline - SystemClock().Uptime();
-    if (left <= absl::ZeroDuration()) return false;
-    pollfd socket = {.fd = PQsocket(connection_), .events = POLLIN, .revents = 0};
-    const int ready = ::poll(&socket, 1, static_cast<int>(absl::ToInt64Milliseconds(left)) + 1);
-    if (ready < 0 && errno != EINTR) return false;
-    if (ready > 0 && PQconsumeInput(connection_) == 0) return false;
+    if (!WaitForSocket(POLLIN, deadline)) return false;
   }
   return true;
 }
@@ -164,6 +189,7 @@ PostgresError PostgresConnection::Receive(absl::Duration deadline, SqlResult* re
     const ResultOwner got(PQgetResult(connection_), &PQclear);
     if (got == nullptr) return error;
     const ExecStatusType status = PQresultStatus(got.get());
+    if (status == PGRES_PIPELINE_ABORTED) continue;
     if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) {
       error = ResultError(got.get());
       if (error.fault == PostgresFault::kBroken) return error;
@@ -189,37 +215,86 @@ PostgresError PostgresConnection::Execute(const std::string& sql, absl::Duration
   return Receive(deadline, result);
 }
 
-PostgresError PostgresConnection::Run(const std::string& name, const PostgresStatement& statement,
-                                      const SqlParameters& parameters, absl::Duration deadline, SqlResult* result) {
-  std::vector<std::string> texts(statement.parameters.size());
-  std::vector<const char*> values(statement.parameters.size(), nullptr);
-  for (size_t i = 0; i < values.size(); ++i) {
-    const auto given = std::find_if(parameters.begin(), parameters.end(),
-                                    [&](const auto& parameter) { return parameter.first == statement.parameters[i]; });
-    MW_CHECK(given != parameters.end());
-    if (std::holds_alternative<std::nullopt_t>(given->second)) continue;
-    const auto* integer = std::get_if<int64_t>(&given->second);
-    texts[i] = integer != nullptr ? absl::StrCat(*integer) : std::get<std::string>(given->second);
-    // libpq would silently end the text there.
-    if (texts[i].find('\0') != std::string::npos) {
-      return {PostgresFault::kFinal,
-              absl::InvalidArgumentError(absl::StrCat(given->first, " has a zero byte, expected text"))};
-    }
-    values[i] = texts[i].c_str();
-  }
-  if (prepared_.count(name) == 0) {
-    if (PQsendPrepare(connection_, name.c_str(), statement.sql.c_str(), 0, nullptr) == 0) {
-      return ConnectionError("cannot send");
-    }
-    PostgresError error = Receive(deadline, result);
-    if (!error.status.ok()) return error;
-    prepared_.insert(name);
-  }
-  if (PQsendQueryPrepared(connection_, name.c_str(), static_cast<int>(values.size()), values.data(), nullptr, nullptr,
-                          /*resultFormat=*/0) == 0) {
+PostgresError PostgresConnection::Prepare(const PostgresCall& call, absl::Duration deadline) {
+  if (prepared_.count(*call.name) > 0) return {};
+  if (PQsendPrepare(connection_, call.name->c_str(), call.statement->sql.c_str(), 0, nullptr) == 0) {
     return ConnectionError("cannot send");
   }
-  return Receive(deadline, result);
+  SqlResult nothing;
+  PostgresError error = Receive(deadline, &nothing);
+  if (error.status.ok()) prepared_.insert(*call.name);
+  return error;
+}
+
+PostgresError PostgresConnection::Send(const PostgresCall& call) {
+  std::vector<std::string> texts(call.statement->parameters.size());
+  std::vector<const char*> values(texts.size(), nullptr);
+  for (size_t i = 0; i < values.size(); ++i) {
+    const SqlValue& given = ValueOf(call, call.statement->parameters[i]);
+    if (std::holds_alternative<std::nullopt_t>(given)) continue;
+    const auto* const integer = std::get_if<int64_t>(&given);
+    texts[i] = integer != nullptr ? absl::StrCat(*integer) : std::get<std::string>(given);
+    values[i] = texts[i].c_str();
+  }
+  const int sent = PQsendQueryPrepared(connection_, call.name->c_str(), static_cast<int>(values.size()), values.data(),
+                                       nullptr, nullptr, /*resultFormat=*/0);
+  return sent == 0 ? ConnectionError("cannot send") : PostgresError();
+}
+
+PostgresError PostgresConnection::Run(const PostgresCall& call, absl::Duration deadline, SqlResult* result) {
+  PostgresError error = CheckTexts(call);
+  if (error.status.ok()) error = Prepare(call, deadline);
+  if (error.status.ok()) error = Send(call);
+  return error.status.ok() ? Receive(deadline, result) : error;
+}
+
+PostgresError PostgresConnection::RunAll(const std::vector<PostgresCall>& calls, absl::Duration deadline,
+                                         std::vector<SqlResult>* results) {
+  for (const PostgresCall& call : calls) {
+    PostgresError error = CheckTexts(call);
+    if (error.status.ok()) error = Prepare(call, deadline);
+    if (!error.status.ok()) return error;
+  }
+  // A server whose results nobody reads takes no more statements: sending must not wait for it.
+  if (PQsetnonblocking(connection_, 1) != 0 || PQenterPipelineMode(connection_) == 0) {
+    return ConnectionError("cannot send");
+  }
+  for (const PostgresCall& call : calls) {
+    PostgresError error = Send(call);
+    if (!error.status.ok()) return error;
+  }
+  if (PQpipelineSync(connection_) == 0 || !Flush(deadline)) return ConnectionError("cannot send");
+  PostgresError error = ReceiveAll(calls.size(), deadline, results);
+  if (error.fault == PostgresFault::kBroken) return error;
+  if (PQexitPipelineMode(connection_) == 0 || PQsetnonblocking(connection_, 0) != 0) {
+    return ConnectionError("the connection broke");
+  }
+  return error;
+}
+
+bool PostgresConnection::Flush(absl::Duration deadline) {
+  while (true) {
+    const int left = PQflush(connection_);
+    if (left <= 0) return left == 0;
+    if (!WaitForSocket(POLLIN | POLLOUT, deadline)) return false;
+  }
+}
+
+// What follows an error has not run: the server says so of each, and then that it is in step again.
+PostgresError PostgresConnection::ReceiveAll(size_t calls, absl::Duration deadline, std::vector<SqlResult>* results) {
+  PostgresError error;
+  for (size_t i = 0; i < calls; ++i) {
+    SqlResult result;
+    PostgresError received = Receive(deadline, &result);
+    if (received.fault == PostgresFault::kBroken) return received;
+    if (!error.status.ok()) continue;
+    error = std::move(received);
+    if (error.status.ok()) results->push_back(std::move(result));
+  }
+  if (!WaitForInput(deadline)) return ConnectionError("no answer");
+  const ResultOwner in_step(PQgetResult(connection_), &PQclear);
+  if (PQresultStatus(in_step.get()) != PGRES_PIPELINE_SYNC) return ConnectionError("the connection broke");
+  return error;
 }
 
 PostgresError PostgresConnection::RunCommand(const std::string& command, absl::Duration deadline) {

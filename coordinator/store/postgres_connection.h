@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <set>
@@ -37,6 +38,13 @@ struct PostgresStatement {
 };
 PostgresStatement NumberParameters(const std::string& sql);
 
+// A statement with what it is run with, all of which outlive the call.
+struct PostgresCall {
+  const std::string* name = nullptr;
+  const PostgresStatement* statement = nullptr;
+  const SqlParameters* parameters = nullptr;
+};
+
 // Where a connection string leads, to name it in messages: "PostgreSQL at host:port/database", never a password.
 // InvalidArgument when it is none.
 absl::StatusOr<std::string> DescribePostgresUrl(const std::string& url);
@@ -51,8 +59,11 @@ class PostgresConnection {
   PostgresConnection& operator=(const PostgresConnection&) = delete;
   ~PostgresConnection();
 
-  PostgresError Run(const std::string& name, const PostgresStatement& statement, const SqlParameters& parameters,
-                    absl::Duration deadline, SqlResult* result);
+  PostgresError Run(const PostgresCall& call, absl::Duration deadline, SqlResult* result);
+  // Runs several in one round trip (libpq's pipeline), inside a transaction that is open: after an error none of the
+  // rest has run. `results` gets one for each that ran.
+  PostgresError RunAll(const std::vector<PostgresCall>& calls, absl::Duration deadline,
+                       std::vector<SqlResult>* results);
   // BEGIN, COMMIT or ROLLBACK.
   PostgresError RunCommand(const std::string& command, absl::Duration deadline);
   // Applies the migrations that the database lacks, in one transaction. Coordinators that start at once wait for each
@@ -64,9 +75,16 @@ class PostgresConnection {
  private:
   PostgresConnection(pg_conn* connection, std::string description);
   PostgresError Execute(const std::string& sql, absl::Duration deadline, SqlResult* result);
+  PostgresError Prepare(const PostgresCall& call, absl::Duration deadline);
+  PostgresError Send(const PostgresCall& call);
+  // Until all that was to be sent is. False when the deadline passed or the server is gone, as of the next two.
+  bool Flush(absl::Duration deadline);
+  bool WaitForInput(absl::Duration deadline);
+  // `events`: of poll().
+  bool WaitForSocket(int16_t events, absl::Duration deadline);
   // The results of what was sent; `result` gets the rows of the last.
   PostgresError Receive(absl::Duration deadline, SqlResult* result);
-  bool WaitForInput(absl::Duration deadline);
+  PostgresError ReceiveAll(size_t calls, absl::Duration deadline, std::vector<SqlResult>* results);
   PostgresError ConnectionError(const std::string& what);
   PostgresError ResultError(const pg_result* result);
 

@@ -63,7 +63,7 @@ class PostgresDatabase : public SqlDatabase {
     MW_CHECK(statement != statements_.end());
     SqlResult result;
     MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Duration deadline) {
-      return connection.Run(name, statement->second, parameters, deadline, &result);
+      return connection.Run({&name, &statement->second, &parameters}, deadline, &result);
     }));
     return result;
   }
@@ -87,18 +87,21 @@ class PostgresDatabase : public SqlDatabase {
  private:
   // Cancelled: one did not change exactly one row, and nothing was changed.
   absl::StatusOr<std::vector<SqlResult>> RunTransaction(const std::vector<SqlCall>& calls, bool each_changes_one_row) {
+    std::vector<PostgresCall> prepared;
+    prepared.reserve(calls.size());
+    for (const SqlCall& call : calls) {
+      prepared.push_back({&call.statement, &statements_.at(call.statement), &call.parameters});
+    }
     std::vector<SqlResult> results;
     bool all_changed = true;
     MW_RETURN_IF_ERROR(Attempt([&](PostgresConnection& connection, absl::Duration deadline) {
       results.clear();
-      all_changed = true;
       PostgresError error = connection.RunCommand("BEGIN", deadline);
-      for (const SqlCall& call : calls) {
-        if (!error.status.ok() || !all_changed) break;
-        SqlResult& result = results.emplace_back();
-        error = connection.Run(call.statement, statements_.at(call.statement), call.parameters, deadline, &result);
-        all_changed = !each_changes_one_row || result.changed == 1;
-      }
+      if (error.status.ok()) error = connection.RunAll(prepared, deadline, &results);
+      if (error.fault == PostgresFault::kBroken) return error;
+      all_changed = !each_changes_one_row || std::all_of(results.begin(), results.end(), [](const SqlResult& result) {
+        return result.changed == 1;
+      });
       if (error.status.ok() && all_changed) return connection.RunCommand("COMMIT", deadline);
       const PostgresError rollback = connection.RunCommand("ROLLBACK", deadline);
       return error.status.ok() ? rollback : error;
