@@ -93,10 +93,9 @@ class ReconstructionServiceTest : public testing::Test {
     store_.reset();
     store_ = *OpenSqliteJobStore(folder_ + "/state.sqlite");
     workers_ = std::make_unique<WorkerService>(kLease, kRetry, *store_);
-    service_ = OpenService({.data_folder = folder_ + "/data",
-                            .scene_roots = {folder_ + "/roots"},
-                            .method_version = method_version},
-                           *workers_);
+    service_ = OpenService(
+        {.data_folder = folder_ + "/data", .scene_roots = {folder_ + "/roots"}, .method_version = method_version},
+        *workers_);
   }
   std::unique_ptr<ReconstructionService> OpenService(const ReconstructionServiceOptions& options,
                                                      WorkerService& workers) {
@@ -106,10 +105,11 @@ class ReconstructionServiceTest : public testing::Test {
          .blobs = blobs_.get(),
          .clock = &clock_,
          .pool = &pool_,
-         .jobs_changed = [&workers, tell = options.tell_others] {
-           workers.Wake();
-           tell({StoreNews::About::kJobs, ""});
-         },
+         .jobs_changed =
+             [&workers, tell = options.tell_others] {
+               workers.Wake();
+               tell({StoreNews::About::kJobs, ""});
+             },
          .parse_config = ParseTestMethod,
          .list_photographs = [](const std::string&) { return std::vector<PhotographFile>(); },
          .max_failures = kRetry.max_failures},

@@ -61,8 +61,7 @@ PostgresError CheckTexts(const PostgresCall& call) {
   for (const auto& [name, value] : *call.parameters) {
     const auto* const text = std::get_if<std::string>(&value);
     if (text == nullptr || text->find('\0') == std::string::npos) continue;
-    return {PostgresFault::kFinal,
-            absl::InvalidArgumentError(absl::StrCat(name, " has a zero byte, expected text"))};
+    return {PostgresFault::kFinal, absl::InvalidArgumentError(absl::StrCat(name, " has a zero byte, expected text"))};
   }
   return {};
 }

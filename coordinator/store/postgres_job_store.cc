@@ -99,9 +99,8 @@ class PostgresDatabase : public SqlDatabase {
       PostgresError error = connection.RunCommand("BEGIN", deadline);
       if (error.status.ok()) error = connection.RunAll(prepared, deadline, &results);
       if (error.fault == PostgresFault::kBroken) return error;
-      all_changed = !each_changes_one_row || std::all_of(results.begin(), results.end(), [](const SqlResult& result) {
-        return result.changed == 1;
-      });
+      all_changed = !each_changes_one_row || std::all_of(results.begin(), results.end(),
+                                                         [](const SqlResult& result) { return result.changed == 1; });
       if (error.status.ok() && all_changed) return connection.RunCommand("COMMIT", deadline);
       const PostgresError rollback = connection.RunCommand("ROLLBACK", deadline);
       return error.status.ok() ? rollback : error;

@@ -9,8 +9,7 @@
 namespace meshwright {
 
 // By LISTEN and NOTIFY of PostgreSQL (https://www.postgresql.org/docs/15/sql-notify.html), over one connection of its
-// own, which is made again when it breaks. Through a pooler that hands each transaction another session nothing is
-// heard; then all is found by looking.
+// own, which is made again when it breaks.
 std::unique_ptr<StoreNewsChannel> OpenPostgresNews(const std::string& url);
 
 }  // namespace meshwright

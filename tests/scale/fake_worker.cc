@@ -22,6 +22,7 @@ FakeWorkerFigures FakeWorker::Run() {
   request.set_cores(1);
   request.set_memory_bytes(int64_t{1} << 30);
   request.set_method_version(kMethodVersion);
+  bool is_repeated = false;
   while (!stopping_) {
     const bool brings_result = request.held_size() > 0;
     request.set_wait_timeout_seconds(brings_result ? 0 : 5);
@@ -30,10 +31,12 @@ FakeWorkerFigures FakeWorker::Run() {
     if (!answer.ok()) {
       if (stopping_) break;
       ++figures.failed_calls;
+      is_repeated = true;
       absl::SleepFor(absl::Milliseconds(200));
       continue;  // repeating a call is harmless
     }
-    if (brings_result) figures.answer_seconds.push_back(since_asked.Seconds());
+    if (brings_result && !is_repeated) figures.answer_seconds.push_back(since_asked.Seconds());
+    is_repeated = false;
 
     // A result that is listed once more has not been taken yet; every other job is a new one.
     std::optional<v1::HeldJob> waiting;

@@ -3,6 +3,7 @@
 // coordinator as a process of its own, PostgreSQL or SQLite. Prints what it measured as JSON. See docs/benchmarks.md.
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <map>
@@ -42,7 +43,8 @@ struct Settings {
   int workers = 200;
   int job_ms = 300;
   int window = 400;
-  int event_streams = 0;  // of the first reconstruction
+  int event_streams = 0;   // of the first reconstruction
+  double crash_share = 0;  // of all cameras, after which the coordinator is killed and started anew; 0: it is not
 };
 
 // A number of /proc/PROCESS/status.
@@ -69,11 +71,32 @@ double CpuSeconds(pid_t process) {
   return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
+std::string NameOf(int reconstruction) { return absl::StrCat("wall-", reconstruction); }
+
 double Percentile(std::vector<double>& values, double share) {
   if (values.empty()) return 0;
   const auto place = values.begin() + static_cast<int64_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), place, values.end());
   return *place;
+}
+
+std::vector<v1::Reconstruction> GetAll(ServiceClient& client, const Settings& settings) {
+  std::vector<v1::Reconstruction> all;
+  for (int i = 0; i < settings.reconstructions; ++i) {
+    const auto one = client.Get(NameOf(i));
+    // Only where the coordinator is being started anew nobody answers.
+    MW_CHECK(one.ok() || settings.crash_share > 0);
+    if (!one.ok()) return {};
+    MW_CHECK(one->state() != v1::RECONSTRUCTION_STATE_FAILED);
+    all.push_back(*one);
+  }
+  return all;
+}
+
+int64_t CommittedIn(const std::vector<v1::Reconstruction>& all) {
+  int64_t committed = 0;
+  for (const v1::Reconstruction& one : all) committed += one.progress().cameras_committed();
+  return committed;
 }
 
 int Measure(const Settings& settings) {
@@ -92,25 +115,24 @@ int Measure(const Settings& settings) {
     arguments.insert(arguments.end(), {"--store", postgres->url()});
   }
   const std::string log = folder / "coordinator.log";
-  end_to_end::BackgroundProgram coordinator(settings.coordinator_program, arguments, log);
+  auto coordinator = std::make_unique<end_to_end::BackgroundProgram>(settings.coordinator_program, arguments, log);
   const std::string address = absl::StrCat("127.0.0.1:", end_to_end::ListeningPort(log));
 
   const std::unique_ptr<ServiceClient> client = ServiceClient::Connect(address);
   const Stopwatch until_first_job;
-  const auto name_of = [](int i) { return absl::StrCat("wall-", i); };
   std::map<std::string, double> ended;  // seconds since the first job could run
   for (int i = 0; i < settings.reconstructions; ++i) {
     v1::CreateReconstructionRequest request;
-    request.set_id(name_of(i));
+    request.set_id(NameOf(i));
     request.set_scene_reference(i == 0 ? "file:large" : "file:small");
     request.set_options_json(absl::StrCat(R"({"refine-cameras": 0, "window": )", settings.window, "}"));
     MW_CHECK(client->Create(request).ok());
-    const auto begun = client->Start(name_of(i));
+    const auto begun = client->Start(NameOf(i));
     MW_CHECK(begun.ok());
   }
   // The scenes become blobs and pairs before the first job is there.
   for (int i = 0; i < settings.reconstructions; ++i) {
-    while (client->Get(name_of(i))->progress().cameras_total() == 0) absl::SleepFor(absl::Milliseconds(50));
+    while (client->Get(NameOf(i))->progress().cameras_total() == 0) absl::SleepFor(absl::Milliseconds(50));
   }
 
   const double seconds_until_first_job = until_first_job.Seconds();
@@ -123,7 +145,7 @@ int Measure(const Settings& settings) {
     workers.push_back(std::make_unique<FakeWorker>(absl::StrCat("worker-", i), *channels.back(), **blobs,
                                                    absl::Milliseconds(settings.job_ms)));
   }
-  EventListeners listeners(end_to_end::ListeningPort(log, "HTTP on port "), name_of(0), settings.event_streams);
+  EventListeners listeners(end_to_end::ListeningPort(log, "HTTP on port "), NameOf(0), settings.event_streams);
   std::vector<FakeWorkerFigures> figures(workers.size());
   std::vector<std::thread> threads;
   const Stopwatch stopwatch;
@@ -133,18 +155,33 @@ int Measure(const Settings& settings) {
 
   // Until every camera is committed; joining the meshes is not measured.
   int64_t committed = 0;
+  int64_t total = 0;
+  for (const v1::Reconstruction& one : GetAll(*client, settings)) total += one.progress().cameras_total();
+  Stopwatch since_crash;
+  int64_t committed_at_crash = -1;
+  double seconds_until_committed_again = 0;
   while (static_cast<int>(ended.size()) < settings.reconstructions) {
-    committed = 0;
-    for (int i = 0; i < settings.reconstructions; ++i) {
-      const auto now = client->Get(name_of(i));
-      MW_CHECK(now.ok());
-      MW_CHECK(now->state() != v1::RECONSTRUCTION_STATE_FAILED);
-      committed += now->progress().cameras_committed();
-      if (now->progress().cameras_committed() + now->progress().cameras_skipped() >= now->progress().cameras_total()) {
-        ended.try_emplace(name_of(i), stopwatch.Seconds());
+    absl::SleepFor(absl::Milliseconds(100));
+    const std::vector<v1::Reconstruction> all = GetAll(*client, settings);
+    if (all.empty()) continue;
+    committed = CommittedIn(all);
+    for (const v1::Reconstruction& one : all) {
+      const v1::Progress& progress = one.progress();
+      if (progress.cameras_committed() + progress.cameras_skipped() >= progress.cameras_total()) {
+        ended.try_emplace(one.id(), stopwatch.Seconds());
       }
     }
-    absl::SleepFor(absl::Milliseconds(100));
+    if (settings.crash_share > 0 && committed_at_crash < 0 &&
+        static_cast<double>(committed) >= settings.crash_share * static_cast<double>(total)) {
+      coordinator->Stop(SIGKILL);
+      committed_at_crash = CommittedIn(all);
+      since_crash = Stopwatch();
+      *std::find(arguments.begin(), arguments.end(), "127.0.0.1:0") = address;  // the first: of gRPC
+      coordinator =
+          std::make_unique<end_to_end::BackgroundProgram>(settings.coordinator_program, arguments, log + ".again");
+    } else if (committed_at_crash >= 0 && seconds_until_committed_again == 0 && committed > committed_at_crash) {
+      seconds_until_committed_again = since_crash.Seconds();
+    }
   }
   const double elapsed = stopwatch.Seconds();
   for (const auto& worker : workers) worker->Stop();
@@ -167,22 +204,23 @@ int Measure(const Settings& settings) {
                             {"p99", 1e3 * Percentile(answers, 0.99)},
                             {"max", 1e3 * Percentile(answers, 1)}};
   json["failed_calls"] = failed_calls;
+  if (settings.crash_share > 0) json["seconds_until_committed_again"] = seconds_until_committed_again;
   json["idle_share"] = 1 - busy / (elapsed * settings.workers);
-  json["coordinator_cpu_s"] = CpuSeconds(coordinator.id());
+  json["coordinator_cpu_s"] = CpuSeconds(coordinator->id());
   if (settings.event_streams > 0) {
     json["event_streams"] = {{"clients", settings.event_streams},
                              {"dropped", listeners.dropped()},
                              {"parts_read_per_client", static_cast<double>(listeners.parts()) / settings.event_streams},
                              {"bytes_read", listeners.bytes()}};
   }
-  json["coordinator_threads"] = StatusNumber(coordinator.id(), "Threads:");
-  json["coordinator_peak_mib"] = StatusNumber(coordinator.id(), "VmHWM:") / 1024;
+  json["coordinator_threads"] = StatusNumber(coordinator->id(), "Threads:");
+  json["coordinator_peak_mib"] = StatusNumber(coordinator->id(), "VmHWM:") / 1024;
   std::vector<double> small;
   for (const auto& [name, seconds] : ended) {
-    if (name != name_of(0)) small.push_back(seconds);
+    if (name != NameOf(0)) small.push_back(seconds);
   }
   if (!small.empty()) {
-    json["large_ended_after_s"] = ended[name_of(0)];
+    json["large_ended_after_s"] = ended[NameOf(0)];
     json["small_ended_after_s"] = {
         {"first", Percentile(small, 0)}, {"median", Percentile(small, 0.5)}, {"last", Percentile(small, 1)}};
   }
@@ -206,6 +244,10 @@ int main(int argc, char** argv) {
   program.add_option("--job-ms", settings.job_ms)->capture_default_str();
   program.add_option("--window", settings.window)->capture_default_str();
   program.add_option("--event-streams", settings.event_streams, "clients that follow the first reconstruction")
+      ->capture_default_str();
+  program
+      .add_option("--crash-share", settings.crash_share,
+                  "of all cameras, after which the coordinator is killed and started anew; 0: it is not")
       ->capture_default_str();
   CLI11_PARSE(program, argc, argv);
   return meshwright::scale::Measure(settings);

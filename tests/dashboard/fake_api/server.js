@@ -33,38 +33,18 @@ export class FakeApi {
       jobs: i < 7 ? 3 : 0,
       version: '0.2.0',
     }));
-    const workers = this.workers.slice(0, 7).map((worker) => worker.id);
-    const make = (more) =>
-      new Simulation({
-        facesPerPart: faces,
-        workers,
-        commitsPerSecond: 0,
-        ...more,
-      });
-    this.simulations = new Map(
-      [
-        make({
-          id: 'campaign',
-          cameras,
-          startCommitted: committed,
-          commitsPerSecond: rate,
-        }),
-        make({
-          id: 'second-flight',
-          cameras: 240,
-          startCommitted: 60,
-          commitsPerSecond: rate / 10,
-        }),
-        make({ id: 'done', cameras: 60, startCommitted: 60, state: 'DONE' }),
-        make({
-          id: 'broken',
-          cameras: 12,
-          startCommitted: 2,
-          state: 'FAILED',
-          failure: 'images/DJI_0007.JPG: 4000 x 2250 px, but its camera has 4000 x 3000',
-        }),
-      ].map((simulation) => [simulation.id, simulation]),
-    );
+    this.simulations = new Map();
+    this.facesPerPart = faces;
+    this.add({ id: 'campaign', cameras, startCommitted: committed, commitsPerSecond: rate });
+    this.add({ id: 'second-flight', cameras: 240, startCommitted: 60, commitsPerSecond: rate / 10 });
+    this.add({ id: 'done', cameras: 60, startCommitted: 60, state: 'DONE' });
+    this.add({
+      id: 'broken',
+      cameras: 12,
+      startCommitted: 2,
+      state: 'FAILED',
+      failure: 'images/DJI_0007.JPG: 4000 x 2250 px, but its camera has 4000 x 3000',
+    });
     this.uploads = new Map(); // id -> path -> {size, sha256, bytes}
     this.created = new Map();
     this.startedWith = new Map(); // id -> path -> file
@@ -72,6 +52,13 @@ export class FakeApi {
     this.requests = 0;
     this.failNext = 0; // so many of the next parts of files are refused
     this.streams = new Set();
+  }
+
+  // One more reconstruction: what Simulation takes, `id` and `cameras` at least.
+  add(more) {
+    const workers = this.workers.slice(0, 7).map((worker) => worker.id);
+    const standing = { facesPerPart: this.facesPerPart, workers, commitsPerSecond: 0, startCommitted: 0 };
+    this.simulations.set(more.id, new Simulation({ ...standing, ...more }));
   }
 
   async listen(port = 0) {
