@@ -72,7 +72,7 @@ void AddSynthesizeCommand(CLI::App& program, Run& run) {
   command.add_option("KIND", arguments->kind, "facade, ring, room or street")->required();
   command.add_option("-o,--output", arguments->folder, "folder to write")->required();
   SyntheticOptions& options = arguments->options;
-  command.add_option("--cameras", options.cameras, "photographs, 2..1000; facade at most 24")->capture_default_str();
+  command.add_option("--cameras", options.cameras, "photographs, 2..10000; facade at most 24")->capture_default_str();
   command.add_option("--width", options.width, "of a photograph, px, 64..8192")->capture_default_str();
   command.add_option("--height", options.height, "of a photograph, px, 64..8192")->capture_default_str();
   command.add_option("--seed", options.seed, "of everything that is drawn by lot")->capture_default_str();

@@ -98,7 +98,7 @@ absl::StatusOr<SyntheticKind> ParseSyntheticKind(const std::string& name) {
 }
 
 absl::Status SyntheticOptions::Validate() const {
-  MW_RETURN_IF_ERROR(CheckRange("cameras", cameras, 2, kind == SyntheticKind::kFacade ? 24 : 1000));
+  MW_RETURN_IF_ERROR(CheckRange("cameras", cameras, 2, kind == SyntheticKind::kFacade ? 24 : 10'000));
   MW_RETURN_IF_ERROR(CheckRange("width", width, 64, 8192));
   MW_RETURN_IF_ERROR(CheckRange("height", height, 64, 8192));
   MW_RETURN_IF_ERROR(CheckRange("noise_sigma", noise_sigma, 0, 50));

@@ -29,7 +29,7 @@ absl::StatusOr<SyntheticKind> ParseSyntheticKind(const std::string& name);
 
 struct SyntheticOptions {
   SyntheticKind kind = SyntheticKind::kFacade;
-  int cameras = 10;                    // 2 .. 1000; facade at most 24
+  int cameras = 10;                    // 2 .. 10000; facade at most 24
   int width = 800;                     // px, 64 .. 8192
   int height = 600;                    // px, 64 .. 8192
   uint64_t seed = 1;                   // of everything that is drawn by lot
