@@ -48,7 +48,9 @@ for (const cameras of SIZES) {
         const page = await openPage(t, browser, `${base}#/reconstructions/${id}`, { colorScheme, viewport });
         await page.locator('.camera-row').first().waitFor();
         const { parts } = api.simulations.get(id);
-        if (parts.length > 0) await until(async () => (await meshNumbers(page)).shown > 0);
+        const wanted = Math.min(2000, 390 * parts.length);
+        await until(async () => (await meshNumbers(page)).shown >= wanted);
+        await page.waitForTimeout(500); // the last of it is drawn
         await keepScreenshot(page, `gallery-${id}-${name}`);
         assert.deepEqual(await violations(page), [], name);
         const scroll = await page.evaluate(() => document.documentElement.scrollWidth);

@@ -21,7 +21,7 @@ import {
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { FRUSTUM, POSE, type CameraTable } from '../api/camera_table';
 import { CameraFrusta } from './camera_frusta';
-import { commonUp } from './common_up';
+import { anyNormalTo, firstView } from './first_view';
 import { Measure } from './measure';
 import { PartBuffer, type Coloring } from './part_buffer';
 import type { LoadedPart } from './part_loader';
@@ -68,6 +68,7 @@ export class SceneViewer {
   private readonly region = new Box3Helper(new Box3(), REGION_COLOR);
   private readonly resizing: ResizeObserver;
   private readonly up = new Vector3(0, 0, 1);
+  private toViewer: Vector3 | null = null;
   private readonly cameraBox = new Box3();
   private readonly partBox = new Box3();
   private tiles: TileLayer | null = null;
@@ -249,9 +250,7 @@ export class SceneViewer {
     const radius = this.radiusToFit();
     this.fittedRadius = radius;
     this.fittedSurface = !this.partBox.isEmpty();
-    const direction = this.standpoint().sub(center);
-    if (direction.length() < 0.15 * radius) direction.copy(this.up).addScaledVector(anyNormalTo(this.up), 1.2);
-    direction.normalize().addScaledVector(this.up, 0.35).normalize();
+    const direction = this.toViewer?.clone() ?? this.fromCamerasBeside(center, radius);
     const narrow = Math.min(1, this.view.aspect);
     const distance = (0.75 * radius) / (Math.tan((this.view.fov * Math.PI) / 360) * narrow);
     this.view.position.copy(center).addScaledVector(direction, distance);
@@ -438,8 +437,10 @@ export class SceneViewer {
       const pose = table.poses.subarray(POSE * i, POSE * (i + 1));
       this.cameraBox.expandByPoint(new Vector3(pose[9], pose[10], pose[11]));
     }
-    this.up.copy(commonUp(table) ?? new Vector3(0, 0, 1));
-    this.turnUp(this.up);
+    const { up, toViewer } = firstView(table);
+    this.up.copy(up);
+    this.toViewer = toViewer;
+    this.turnUp(up);
   }
 
   // What is up on the screen. The controls read it once, when they are made.
@@ -476,8 +477,11 @@ export class SceneViewer {
     return radiusOf(this.boxToFit());
   }
 
-  private standpoint(): Vector3 {
-    return this.cameraBox.isEmpty() ? new Vector3() : this.cameraBox.getCenter(new Vector3());
+  // Where cameras look in all directions: from their middle, or aslant from above where that is in the surface.
+  private fromCamerasBeside(center: Vector3, radius: number): Vector3 {
+    const direction = this.cameraBox.getCenter(new Vector3()).sub(center);
+    if (direction.length() < 0.15 * radius) direction.copy(this.up).addScaledVector(anyNormalTo(this.up), 1.2);
+    return direction.normalize().addScaledVector(this.up, 0.35).normalize();
   }
 
   private placeClippingPlanes() {
@@ -515,9 +519,4 @@ function drawsInSoftware(): boolean {
 
 function quaternionBetween(from: Vector3, to: Vector3): Quaternion {
   return new Quaternion().setFromUnitVectors(from, to);
-}
-
-function anyNormalTo(axis: Vector3): Vector3 {
-  const other = Math.abs(axis.x) < 0.9 ? new Vector3(1, 0, 0) : new Vector3(0, 1, 0);
-  return other.cross(axis).normalize();
 }
