@@ -20,10 +20,11 @@ namespace {
 // Commits that are decided quickly share one wait for the disk; none waits much longer than this for another.
 constexpr absl::Duration kWriteEvery = absl::Milliseconds(50);
 
-// What judging again takes for each comparison, and the mesh for each accepted patch, by what acceptance takes for each
-// comparison: roughly, for JoiningProgress measures them once they run.
-constexpr double kJudgingByAcceptance = 0.15;
-constexpr double kJoiningByAcceptance = 8;
+// What judging again takes for each comparison, by what acceptance takes for each, and what the mesh takes for each
+// accepted patch on two cores of 2026, s: roughly, for JoiningProgress measures them once they run. The latter is not by
+// acceptance, whose comparisons are quick where surfaces hardly overlap.
+constexpr double kJudgingByAcceptance = 0.4;
+constexpr double kJoiningSecondsPerPatch = 15e-6;
 
 std::string Name(SequenceNumber sequence) { return absl::StrCat("camera job ", sequence); }
 
@@ -445,8 +446,7 @@ ForecastInput Conductor::ForecastNow() const {
   const double seconds = acceptance_times_.seconds / acceptance_times_.comparisons;
   const double all_by_done = (done_rays + input.left.expected_rays) / done_rays;
   input.judging_seconds = kJudgingByAcceptance * seconds * comparisons * all_by_done;
-  input.joining_seconds =
-      kJoiningByAcceptance * seconds * static_cast<double>(progress_.patches_accepted) * all_by_done;
+  input.joining_seconds = kJoiningSecondsPerPatch * static_cast<double>(progress_.patches_accepted) * all_by_done;
   return input;
 }
 
