@@ -21,8 +21,8 @@ namespace {
 constexpr absl::Duration kWriteEvery = absl::Milliseconds(50);
 
 // What judging again takes for each comparison, by what acceptance takes for each, and what the mesh takes for each
-// accepted patch on two cores of 2026, s: roughly, for JoiningProgress measures them once they run. The latter is not by
-// acceptance, whose comparisons are quick where surfaces hardly overlap.
+// accepted patch on two cores of 2026, s: roughly, for JoiningProgress measures them once they run. The latter is not
+// by acceptance, whose comparisons are quick where surfaces hardly overlap.
 constexpr double kJudgingByAcceptance = 0.4;
 constexpr double kJoiningSecondsPerPatch = 15e-6;
 

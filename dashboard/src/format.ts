@@ -8,6 +8,11 @@ export function count(value: number): string {
   return value < 100_000 ? plain.format(Math.round(value)) : compact.format(value);
 }
 
+// "1 camera", "5,000 cameras".
+export function counted(value: number, what: string): string {
+  return `${count(value)} ${what}${value === 1 ? '' : 's'}`;
+}
+
 export function bytes(value: number): string {
   const units = ['B', 'KiB', 'MiB', 'GiB', 'TiB'];
   let unit = 0;

@@ -4,7 +4,7 @@ import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { SHARES, stateOfCamera, type CameraTable } from '../api/camera_table';
 import { reconstructionUrl } from '../api/client';
 import type { Camera, CameraState } from '../api/types';
-import { count, duration, percent } from '../format';
+import { count, counted, duration, percent } from '../format';
 import type { ReconstructionStore } from '../state/reconstruction_store';
 import { Notice } from './pieces';
 
@@ -80,7 +80,7 @@ function CameraList({ table, onSelect }: { table: CameraTable; onSelect: (camera
       <input
         type="search"
         aria-label="Search cameras by name"
-        placeholder={`Search ${count(table.count)} cameras`}
+        placeholder={`Search ${counted(table.count, 'camera')}`}
         value={search}
         onInput={(event) => {
           setSearch(event.currentTarget.value);

@@ -5,7 +5,7 @@ import type { RefObject } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { api, reconstructionUrl } from '../api/client';
 import { CAMERA_STATES, isOver, stateOf } from '../api/types';
-import { count } from '../format';
+import { count, counted } from '../format';
 import type { ReconstructionStore } from '../state/reconstruction_store';
 import { cssColor, theme } from '../theme';
 import { untilLoaded } from '../until_loaded';
@@ -240,7 +240,7 @@ export function ViewerPanel(props: Props) {
       : numbers.tiles > 0
         ? `The mesh: ${count(Number(store.reconstruction.value?.progress?.faces ?? 0))} triangles` +
           `, ${count(numbers.shown)} shown`
-        : `Surfaces of ${count(numbers.parts)} cameras, side by side: ${count(numbers.faces)} triangles` +
+        : `Surfaces of ${counted(numbers.parts, 'camera')}, side by side: ${count(numbers.faces)} triangles` +
         (numbers.shown < numbers.faces ? `, ${count(numbers.shown)} shown` : '');
   return (
     <section class="card stage" ref={frame} aria-label="The mesh in 3D">
