@@ -30,14 +30,20 @@ export function commonUp(table: CameraTable): Vector3 | null {
   const bestScore = Math.max(0, ...found.map(({ score }) => score));
   if (bestScore < 0.05) return null;
   // Photographs that are all across fit both ways; people look down rather than up.
-  const forward = new Vector3();
-  for (let i = 0; i < table.count; ++i) forward.add(axisOf(table, i, 2));
+  const forward = sumOfForward(table);
   const good = found.filter(({ score }) => score > 0.98 * bestScore);
   return good.reduce((a, b) => (b.up.dot(forward) < a.up.dot(forward) - 1e-6 ? b : a)).up;
 }
 
-// In world coordinates; X of a camera points right, Y down, Z forward.
-export function axisOf(table: CameraTable, camera: number, column: number): Vector3 {
+// Of all cameras, in world coordinates.
+export function sumOfForward(table: CameraTable): Vector3 {
+  const sum = new Vector3();
+  for (let i = 0; i < table.count; ++i) sum.add(axis(table, i, 2));
+  return sum;
+}
+
+// X of a camera points right, Y down, Z forward.
+function axis(table: CameraTable, camera: number, column: number): Vector3 {
   const pose = table.poses.subarray(POSE * camera, POSE * (camera + 1));
   return new Vector3(pose[column], pose[3 + column], pose[6 + column]);
 }
@@ -45,21 +51,21 @@ export function axisOf(table: CameraTable, camera: number, column: number): Vect
 function seeds(table: CameraTable): Vector3[] {
   const mean = [new Vector3(), new Vector3()];
   for (let i = 0; i < table.count; ++i) {
-    mean[0]!.sub(axisOf(table, i, 1));
-    mean[1]!.add(axisOf(table, i, 0));
+    mean[0]!.sub(axis(table, i, 1));
+    mean[1]!.add(axis(table, i, 0));
   }
   const directions = mean.filter((direction) => direction.length() > 1e-6).map((direction) => direction.normalize());
   // Means of photographs that were turned in all ways say nothing; single ones do.
   for (const camera of [0, table.count >> 1, table.count - 1]) {
-    if (camera < table.count) directions.push(axisOf(table, camera, 1).negate(), axisOf(table, camera, 0));
+    if (camera < table.count) directions.push(axis(table, camera, 1).negate(), axis(table, camera, 0));
   }
   return directions.flatMap((direction) => [direction, direction.clone().negate()]);
 }
 
 // The edge of the photograph that `up` is nearest to, as long as it counts.
 function nearestEdge(table: CameraTable, camera: number, up: Vector3): Vector3 {
-  const upper = axisOf(table, camera, 1).negate();
-  const right = axisOf(table, camera, 0);
+  const upper = axis(table, camera, 1).negate();
+  const right = axis(table, camera, 0);
   const edges: [Vector3, number][] = [
     [upper, 1],
     [right, ACROSS_WEIGHT],

@@ -2,7 +2,7 @@
 // From where a scene is looked at first.
 import { Vector3 } from 'three';
 import type { CameraTable } from '../api/camera_table';
-import { axisOf, commonUp } from './common_up';
+import { commonUp, sumOfForward } from './common_up';
 
 // Scenes that were photographed from above have Z upwards, for they know where they are on the Earth.
 const Z = new Vector3(0, 0, 1);
@@ -21,9 +21,7 @@ export interface FirstView {
 // aslant, with their upper edges at the back.
 export function firstView(table: CameraTable): FirstView {
   const edge = commonUp(table);
-  const toViewer = new Vector3();
-  for (let i = 0; i < table.count; ++i) toViewer.sub(axisOf(table, i, 2));
-  toViewer.divideScalar(Math.max(table.count, 1));
+  const toViewer = sumOfForward(table).divideScalar(-Math.max(table.count, 1));
   const up = edge === null || toViewer.z > FROM_ABOVE ? Z.clone() : edge;
   if (toViewer.length() < LEAST_IN_COMMON) return { up, toViewer: null };
   toViewer.normalize();
@@ -31,7 +29,12 @@ export function firstView(table: CameraTable): FirstView {
     const back = edge === null || Math.abs(edge.dot(up)) > STEEP ? anyNormalTo(up) : edge;
     return { up, toViewer: toViewer.addScaledVector(back, -0.9).normalize() };
   }
-  return { up, toViewer: toViewer.addScaledVector(up, 0.35).normalize() };
+  return { up, toViewer: aLittleHigher(toViewer, up) };
+}
+
+// The direction, raised and of unit length; in place.
+export function aLittleHigher(direction: Vector3, up: Vector3): Vector3 {
+  return direction.normalize().addScaledVector(up, 0.35).normalize();
 }
 
 export function anyNormalTo(axis: Vector3): Vector3 {

@@ -21,7 +21,7 @@ import {
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { FRUSTUM, POSE, type CameraTable } from '../api/camera_table';
 import { CameraFrusta } from './camera_frusta';
-import { anyNormalTo, firstView } from './first_view';
+import { aLittleHigher, anyNormalTo, firstView } from './first_view';
 import { Measure } from './measure';
 import { PartBuffer, type Coloring } from './part_buffer';
 import type { LoadedPart } from './part_loader';
@@ -481,7 +481,7 @@ export class SceneViewer {
   private fromCamerasBeside(center: Vector3, radius: number): Vector3 {
     const direction = this.cameraBox.getCenter(new Vector3()).sub(center);
     if (direction.length() < 0.15 * radius) direction.copy(this.up).addScaledVector(anyNormalTo(this.up), 1.2);
-    return direction.normalize().addScaledVector(this.up, 0.35).normalize();
+    return aLittleHigher(direction, this.up);
   }
 
   private placeClippingPlanes() {
