@@ -116,14 +116,14 @@ bool ReconstructionService::WakeConductor(const std::string& id) {
 }
 
 void ReconstructionService::Hear(const StoreNews& news) {
-  const bool is_all = news.about == StoreNews::About::kAll;
-  if (is_all || news.about == StoreNews::About::kJobs) workers_.Wake();
-  if (is_all || news.about == StoreNews::About::kStates) {
-    workers_.Wake();
-    Changed(/*look=*/true);
+  if (news.about == StoreNews::About::kResults) {
+    WakeConductor(news.reconstruction);
+    return;
   }
-  if (news.about == StoreNews::About::kResults) WakeConductor(news.reconstruction);
-  if (!is_all) return;
+  workers_.Wake();
+  if (news.about == StoreNews::About::kJobs) return;
+  Changed(/*look=*/true);
+  if (news.about == StoreNews::About::kStates) return;
   const MutexLock lock(mutex_);
   for (auto& [id, conducted] : conducted_) conducted->Wake();
 }

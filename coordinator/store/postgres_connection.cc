@@ -2,9 +2,11 @@
 #include "coordinator/store/postgres_connection.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
+#include <iterator>
 #include <utility>
 
 #include <absl/strings/ascii.h>
@@ -23,6 +25,20 @@ const std::vector<std::pair<std::string, std::string>>& PostgresMigrations();
 namespace {
 
 constexpr int64_t kMigrationLock = 0x4d574a53;  // the key of the advisory lock: "MWJS", as in SQLite files
+
+// What comes later counts, so the connection string may say otherwise. A peer that vanished is noticed after 10 s.
+constexpr const char* kKeywords[] = {"connect_timeout",
+                                     "tcp_user_timeout",
+                                     "target_session_attrs",
+                                     "application_name",
+                                     "dbname",
+                                     "client_encoding",
+                                     nullptr};
+constexpr char kApplication[] = "meshwright";
+
+std::array<const char*, std::size(kKeywords)> ValuesOf(const std::string& url, const char* application) {
+  return {"5", "10000", "read-write", application, url.c_str(), "UTF8", nullptr};
+}
 
 using ResultOwner = std::unique_ptr<PGresult, void (*)(PGresult*)>;
 
@@ -109,6 +125,10 @@ absl::StatusOr<std::string> DescribePostgresUrl(const std::string& url) {
                       value_or("dbname", ""));
 }
 
+pg_conn* ConnectToPostgres(const std::string& url, const char* application) {
+  return PQconnectdbParams(kKeywords, ValuesOf(url, application).data(), /*expand_dbname=*/1);
+}
+
 PostgresConnection::PostgresConnection(pg_conn* connection, std::string description)
     : connection_(connection), description_(std::move(description)) {}
 
@@ -116,21 +136,11 @@ PostgresConnection::~PostgresConnection() { PQfinish(connection_); }
 
 PostgresError PostgresConnection::Open(const std::string& url, const std::string& description,
                                        std::unique_ptr<PostgresConnection>* connection) {
-  // What comes later counts, so the connection string may say otherwise. A peer that vanished is noticed after 10 s.
-  const char* const keywords[] = {"connect_timeout",
-                                  "tcp_user_timeout",
-                                  "target_session_attrs",
-                                  "application_name",
-                                  "dbname",
-                                  "client_encoding",
-                                  nullptr};
-  const char* const values[] = {"5", "10000", "read-write", "meshwright", url.c_str(), "UTF8", nullptr};
-  std::unique_ptr<PostgresConnection> opened(
-      new PostgresConnection(PQconnectdbParams(keywords, values, /*expand_dbname=*/1), description));
+  std::unique_ptr<PostgresConnection> opened(new PostgresConnection(ConnectToPostgres(url, kApplication), description));
   if (PQstatus(opened->connection_) != CONNECTION_OK) {
     PostgresError error = opened->ConnectionError("cannot connect");
     // A server that answers, and still lets nobody in, will not do so a moment later: a wrong password or database.
-    const PGPing ping = PQpingParams(keywords, values, /*expand_dbname=*/1);
+    const PGPing ping = PQpingParams(kKeywords, ValuesOf(url, kApplication).data(), /*expand_dbname=*/1);
     if (ping == PQPING_OK) {
       error = {PostgresFault::kFinal, absl::PermissionDeniedError(error.status.message())};
     } else if (ping == PQPING_NO_ATTEMPT) {

@@ -49,6 +49,9 @@ struct PostgresCall {
 // InvalidArgument when it is none.
 absl::StatusOr<std::string> DescribePostgresUrl(const std::string& url);
 
+// Opens a session, or tries to: libpq's own PQstatus says which. `application`: how the server's lists name it.
+pg_conn* ConnectToPostgres(const std::string& url, const char* application);
+
 // One session. Statements are prepared when they are used first. No call waits for the server longer than until its
 // deadline. Not thread-safe.
 class PostgresConnection {

@@ -16,6 +16,7 @@
 
 #include "common/base/check.h"
 #include "common/base/mutex.h"
+#include "coordinator/store/postgres_connection.h"
 
 namespace meshwright {
 namespace {
@@ -87,10 +88,7 @@ class PostgresNews final : public StoreNewsChannel {
  private:
   void Run() {
     while (!IsStopping()) {
-      const char* const keywords[] = {"connect_timeout",  "tcp_user_timeout", "target_session_attrs",
-                                      "application_name", "dbname",           nullptr};
-      const char* const values[] = {"5", "10000", "read-write", "meshwright news", url_.c_str(), nullptr};
-      const ConnectionOwner connection(PQconnectdbParams(keywords, values, /*expand_dbname=*/1), &PQfinish);
+      const ConnectionOwner connection(ConnectToPostgres(url_, "meshwright news"), &PQfinish);
       if (PQstatus(connection.get()) == CONNECTION_OK && Execute(connection.get(), "LISTEN meshwright")) {
         // Whatever was told before could not be heard.
         Hear({StoreNews::About::kAll, ""});

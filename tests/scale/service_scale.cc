@@ -174,7 +174,7 @@ int Measure(const Settings& settings) {
     if (settings.crash_share > 0 && committed_at_crash < 0 &&
         static_cast<double>(committed) >= settings.crash_share * static_cast<double>(total)) {
       coordinator->Stop(SIGKILL);
-      committed_at_crash = CommittedIn(all);
+      committed_at_crash = committed;
       since_crash = Stopwatch();
       *std::find(arguments.begin(), arguments.end(), "127.0.0.1:0") = address;  // the first: of gRPC
       coordinator =
